@@ -1,0 +1,129 @@
+"""What can go wrong, each as one sentence: which parameter, which value, what is allowed, what to do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+
+
+class PointmassError(Exception):
+    """Base of every error that pointmass raises on purpose."""
+
+
+class InvalidInput(PointmassError, ValueError):
+    """An argument, scene file or data file that cannot be used; the message is one sentence."""
+
+
+class Diverged(PointmassError, ArithmeticError):
+    """A run produced a number that is not finite, or a solver could not take its step.
+
+    Attributes
+    ----------
+    particle : int or None
+        Id of the first particle that went wrong.
+    force : str or None
+        The force that acts on it most strongly, or the one that is singular there.
+    step : int or None
+        The step of the solver, counted from the start of the run.
+    time : float or None
+        Time at which that step began [s].
+    largest_safe_dt : float or None
+        Largest step that the stiffnesses and the solver's stability limit allow [s].
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        particle: int | None = None,
+        force: str | None = None,
+        step: int | None = None,
+        time: float | None = None,
+        largest_safe_dt: float | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.particle = particle
+        self.force = force
+        self.step = step
+        self.time = time
+        self.largest_safe_dt = largest_safe_dt
+
+
+def unknown(what: str, name: object, known: Iterable[str]) -> InvalidInput:
+    """The error for a name that is not in a list, with the nearest one that is."""
+    names = sorted(known)
+    near = get_close_matches(str(name), names, n=1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    return InvalidInput(f"unknown {what} {name!r}: {hint}known are {', '.join(names)}")
+
+
+def finite_array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
+    """`value` as a float64 array of `shape` (None = any length) without NaN or infinity."""
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidInput(f"{name} must be numbers of shape {_shape(shape)}, not {_short(value)}") from None
+    if array.ndim != len(shape) or any(
+        want is not None and want != got for want, got in zip(shape, array.shape, strict=True)
+    ):
+        raise InvalidInput(f"{name} must have shape {_shape(shape)}, not {array.shape}")
+    if not np.isfinite(array).all():
+        row = int(np.argwhere(~np.isfinite(array))[0][0]) if array.ndim else 0
+        raise InvalidInput(f"{name} must be finite, but entry {row} is {array.ravel()[~np.isfinite(array.ravel())][0]}")
+    return array
+
+
+def number(
+    name: str,
+    value: Any,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    unit: str = "",
+) -> float:
+    """`value` as a finite float inside the bounds, or `InvalidInput` that names all of them."""
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise InvalidInput(f"{name} must be a number, not {_short(value)}") from None
+    bounds = [
+        text
+        for bound, text in (
+            (above, f"greater than {above}"),
+            (at_least, f"at least {at_least}"),
+            (at_most, f"at most {at_most}"),
+        )
+        if bound is not None
+    ]
+    allowed = "finite" + "".join(f" and {b}" for b in bounds) + (f" [{unit}]" if unit else "")
+    inside = (
+        math.isfinite(result)
+        and (above is None or result > above)
+        and (at_least is None or result >= at_least)
+        and (at_most is None or result <= at_most)
+    )
+    if not inside:
+        raise InvalidInput(f"{name} = {value} is not allowed: it must be {allowed}")
+    return result
+
+
+def whole_number(name: str, value: Any, *, at_least: int) -> int:
+    """`value` as an int that is at least `at_least`."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < at_least:
+        raise InvalidInput(f"{name} = {value} is not allowed: it must be a whole number, at least {at_least}")
+    return int(value)
+
+
+def _shape(shape: tuple[int | None, ...]) -> str:
+    names = ["n" if s is None else str(s) for s in shape]
+    return "(" + ", ".join(names) + ("," if len(names) == 1 else "") + ")"
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,180 @@
+"""What leaves a simulation: a `Frame`, and the camera that looks at it.
+
+The cache, the renderer, the exporters and the viewer see frames and nothing else. A drawable is a list
+of items (points, segments, curves, triangles or arrows) with attributes for each item. Its corners are rows of
+`frame.positions` unless it brings `vertices` of its own, so a net of springs is stored once and moves with
+the particles. Colours are linear-light RGBA; RGB may exceed 1 (light that glows).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.errors import InvalidInput
+
+Floats = NDArray[np.floating[Any]]
+Ints = NDArray[np.integer[Any]]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Points:
+    """Particles as balls (shaded, solid) or as light (`glow`, added up).
+
+    Attributes
+    ----------
+    index : rows of the corners that are drawn, shape (k,); None = all.
+    radius : [m], shape (k,) or ().
+    color : linear RGBA, shape (k, 4) or (4,).
+    glow : True: soft light that adds to what lies behind; False: an opaque shaded ball.
+    """
+
+    kind: ClassVar[str] = "points"
+    name: str
+    version: int = 0
+    vertices: Floats | None = None
+    index: Ints | None = None
+    radius: Floats | float = 0.02
+    color: Floats | tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    glow: bool = False
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Segments:
+    """Straight lines between two corners: springs, sticks.
+
+    Attributes
+    ----------
+    pairs : rows of the corners, shape (k, 2).
+    width : diameter [m], shape (k,) or ().
+    color : linear RGBA, shape (k, 4) or (4,).
+    """
+
+    kind: ClassVar[str] = "segments"
+    name: str
+    version: int = 0
+    vertices: Floats | None = None
+    pairs: Ints
+    width: Floats | float = 0.005
+    color: Floats | tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    glow: bool = False
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Curves:
+    """Open polylines: trails, streamlines, hair.
+
+    Attributes
+    ----------
+    index : rows of the corners, one polyline after another, shape (p,).
+    offsets : where each polyline starts in `index`, and p at the end, shape (c + 1,).
+    width : diameter [m] for each entry of `index`, shape (p,) or ().
+    color : linear RGBA for each entry of `index`, shape (p, 4) or (4,).
+    """
+
+    kind: ClassVar[str] = "curves"
+    name: str
+    version: int = 0
+    vertices: Floats | None = None
+    index: Ints
+    offsets: Ints
+    width: Floats | float = 0.005
+    color: Floats | tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    glow: bool = False
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Triangles:
+    """A mesh, lit from both sides.
+
+    Attributes
+    ----------
+    faces : rows of the corners, counter-clockwise seen from outside, shape (k, 3).
+    color : linear RGBA for each corner that `faces` can name, shape (v, 4) or (4,).
+    smooth : True: shade with the mean normal of each corner; False: each face flat.
+    """
+
+    kind: ClassVar[str] = "triangles"
+    name: str
+    version: int = 0
+    vertices: Floats | None = None
+    faces: Ints
+    color: Floats | tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    smooth: bool = True
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Arrows:
+    """Arrows of a field, of velocities, of forces.
+
+    Attributes
+    ----------
+    vertices : tails [m], shape (k, 3); always its own, never the particles'.
+    vectors : from tail to tip [m], shape (k, 3).
+    width : diameter of the shaft [m], shape (k,) or ().
+    color : linear RGBA, shape (k, 4) or (4,).
+    """
+
+    kind: ClassVar[str] = "arrows"
+    name: str
+    version: int = 0
+    vertices: Floats
+    vectors: Floats
+    width: Floats | float = 0.005
+    color: Floats | tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    glow: bool = False
+
+
+Drawable = Points | Segments | Curves | Triangles | Arrows
+DRAWABLES: dict[str, type[Drawable]] = {c.kind: c for c in (Points, Segments, Curves, Triangles, Arrows)}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Frame:
+    """One look at a simulation.
+
+    Attributes
+    ----------
+    number : 0 for the start of the run.
+    time : [s].
+    ids : shape (n,); an id is never used twice in a run.
+    positions : [m], shape (n, 3).
+    velocities : [m/s], shape (n, 3).
+    drawables : what there is to see. A drawable with the same `name` and `version` as in the frame before is the same.
+    quantities : diagnostics by name, such as "energy" [J]; shown in captions and stored.
+    """
+
+    number: int
+    time: float
+    ids: Ints
+    positions: Floats
+    velocities: Floats
+    drawables: tuple[Drawable, ...] = ()
+    quantities: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Camera:
+    """A pin-hole camera; what is not given is chosen to show the whole scene.
+
+    Attributes
+    ----------
+    position, target : [m]; None = found from the frames.
+    up : direction that is up in the picture.
+    fov : vertical angle of view [degrees], in (1, 170).
+    azimuth, elevation : direction from which an automatic camera looks [degrees]; azimuth 0 looks along -z.
+    """
+
+    position: tuple[float, float, float] | None = None
+    target: tuple[float, float, float] | None = None
+    up: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    fov: float = 35.0
+    azimuth: float = 25.0
+    elevation: float = 15.0
+
+    def __post_init__(self) -> None:
+        if not 1.0 < self.fov < 170.0:
+            raise InvalidInput(f"camera.fov = {self.fov} is not allowed: it must lie between 1 and 170 degrees")

@@ -1,0 +1,109 @@
+"""What a solver may know of a system (four verbs and little more), and what it gives back.
+
+A solver sees numbers `y`, a clock `t` and the four verbs of the lecture: `dim`, `get_state`, `set_state`, `deriv_eval`.
+It knows neither particles nor forces. Independent parts of a system (islands) may each have a clock and
+a step of their own: `t` and `h` are then arrays of shape (dim,), and nothing else changes.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating[Any]]
+Clock = float | Array  # a number, or one for each entry of y
+Memory = dict[str, NDArray[Any]]
+
+
+class System(Protocol):
+    """The side of a system that solvers see.
+
+    `y = [x, v]` for order 2 (x' = v, v' = a), any layout for order 1 (x' = g).
+    """
+
+    @property
+    def dim(self) -> int:
+        """How many numbers the state has."""
+
+    @property
+    def order(self) -> int:
+        """1: y' = g(t, y). 2: y = [x, v] with x' = v, v' = a(t, x, v)."""
+
+    @property
+    def velocity_dependent(self) -> bool:
+        """Whether a depends on v (order 2)."""
+
+    @property
+    def islands(self) -> NDArray[np.intp]:
+        """Island of each entry of y, shape (dim,), counted from 0."""
+
+    @property
+    def inertia(self) -> Array:
+        """Mass that belongs to each entry of v, shape (dim // 2,); order 2 only. M v' = f has a symmetric df/dx."""
+
+    def deriv_eval(self, t: Clock, y: Array) -> Array:
+        """dy/dt, shape (dim,): a new array, a pure function of (t, y)."""
+
+    def jacobian(self, t: Clock, y: Array) -> Any:
+        """d(deriv_eval)/dy, a scipy.sparse CSR array of shape (dim, dim)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One step of a solver.
+
+    Attributes
+    ----------
+    t, h : start and length of the step [s], numbers or arrays of shape (dim,).
+    y0, y1 : state before and after, shape (dim,).
+    memory : what the solver wants back at its next step; entries of shape (dim,) or (islands,).
+    error : estimate of the local error, shape (dim,), from methods that have one.
+    iterations : Newton passes taken, 0 for explicit methods.
+    dense : theta in [0, 1] (a number or an array of shape (dim,)) -> state at t + theta h.
+    """
+
+    t: Clock
+    h: Clock
+    y0: Array
+    y1: Array
+    dense: Callable[[Clock], Array]
+    memory: Memory = field(default_factory=dict)
+    error: Array | None = None
+    iterations: int = 0
+
+
+class Solver(ABC):
+    """Advances y by one step. A leaf is numbers and a docstring; the loops are its family's.
+
+    Attributes
+    ----------
+    name : as in scene files and on the command line.
+    order : of convergence.
+    evaluations : of deriv_eval for one step (implicit methods: at least).
+    """
+
+    name: ClassVar[str]
+    order: ClassVar[int]
+    evaluations: ClassVar[int]
+    implicit: ClassVar[bool] = False
+
+    @abstractmethod
+    def step(self, system: System, t: Clock, y: Array, h: Clock, memory: Memory) -> Step:
+        """The state at t + h. An entry whose h is 0 keeps its bits.
+
+        Raises
+        ------
+        InvalidInput
+            The method needs order 2 and the system has order 1.
+        Diverged
+            The equations of an implicit step could not be solved.
+        """
+
+    def start(self, system: System) -> Memory:
+        """Memory before the first step, and for islands that were set anew (after a collision, at birth)."""
+        return {}
