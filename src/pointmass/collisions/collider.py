@@ -1,0 +1,95 @@
+"""What every collider is: a signed distance, its normal, a motion, a material."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.description import Described
+from pointmass.errors import InvalidInput, number
+from pointmass.laws.parameter import Parameter, Vector
+
+Array = NDArray[np.floating[Any]]
+Contact = Literal["swept", "discrete"]
+
+
+class Collider(Described, ABC):
+    """A surface that particles bounce off: `V' = V_T - k_r V_N` (lecture, "Collision Response"), with Coulomb friction on V_T.
+
+    The free side is where the signed distance is positive.
+
+    Attributes
+    ----------
+    restitution : k_r in [0, 1].
+    friction : Coulomb's mu, at least 0.
+    eps : how near is in contact [m].
+    contact : "swept": nothing tunnels, the time of impact is found; "discrete": the lecture's test at the end of each step.
+    place : the reference point [m]; it may move as a function of t.
+    bulges : True where the solid is convex (ball, block), so that the distance along a line is convex; False where the
+        free space is (room, inside of a sphere).
+    """
+
+    bulges: ClassVar[bool] = True
+
+    def __init__(self, place: Vector, restitution: float, friction: float, eps: float, contact: Contact) -> None:
+        self.place = Parameter("center", place, vector=True, unit="m")
+        if not self.place.common:
+            raise InvalidInput("the place of a collider may depend on t and nothing else")
+        self.velocity_parameter = self.place.rate()
+        self.acceleration_parameter = self.velocity_parameter.rate()
+        self.restitution = number("restitution", restitution, at_least=0, at_most=1)
+        self.friction = number("friction", friction, at_least=0)
+        self.eps = number("eps", eps, above=0, unit="m")
+        if contact not in ("swept", "discrete"):
+            raise InvalidInput(f"contact = {contact!r} is not allowed: it must be 'swept' or 'discrete'")
+        self.contact = contact
+
+    @property
+    def name(self) -> str:
+        """Name for messages and pictures."""
+        return type(self).__name__
+
+    @property
+    def moves(self) -> bool:
+        """Whether the place depends on t."""
+        return not self.place.constant
+
+    @abstractmethod
+    def local_distance(self, x: Array) -> Array:
+        """Signed distance [m] of points given relative to the place, shape (k,)."""
+
+    @abstractmethod
+    def local_normal(self, x: Array) -> Array:
+        """Gradient of the distance, unit vectors, shape (k, 3)."""
+
+    @abstractmethod
+    def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:
+        """Corners relative to the place and triangles, for pictures; what is infinite is drawn `size` [m] wide."""
+
+    def distance(self, x: Array, t: Any) -> Array:
+        """Signed distance [m] of points, shape (k, 3), at time t (a number or shape (k,))."""
+        return self.local_distance(x - self.at(t))
+
+    def normal(self, x: Array, t: Any) -> Array:
+        """Outward unit normals at the points, shape (k, 3)."""
+        return self.local_normal(x - self.at(t))
+
+    def at(self, t: Any) -> Array:
+        """The place [m], shape (3,) or (k, 3)."""
+        return _columns(self.place.at(t))
+
+    def velocity(self, t: Any) -> Array:
+        """Velocity of the surface [m/s], shape (3,) or (k, 3)."""
+        return _columns(self.velocity_parameter.at(t))
+
+    def acceleration(self, t: Any) -> Array:
+        """Acceleration of the surface [m/s^2], shape (3,) or (k, 3)."""
+        return _columns(self.acceleration_parameter.at(t))
+
+
+def _columns(parts: Sequence[Any]) -> Array:
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)

@@ -1,0 +1,40 @@
+"""Gravitation of all particles on each other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pointmass.laws import functions as fn
+from pointmass.laws.pairs import PairForce
+from pointmass.laws.parameter import Parameter, Scalar
+from pointmass.particles import Selection
+
+
+class Gravitation(PairForce):
+    """f_i = -G m_i sum_j m_j d / (d^2 + eps^2)^(3/2), d = x_i - x_j, summed directly over all pairs.
+
+    Energy -G m_i m_j / sqrt(d^2 + eps^2) for each pair.
+
+    Parameters
+    ----------
+    G : constant of gravitation [m^3/(kg s^2)].
+    eps : softening length [m], at least 0; with 0 the law is singular where two particles meet.
+    """
+
+    def __init__(self, G: Scalar = 1.0, eps: Scalar = 0.0, *, on: Selection = None, enabled: bool = True) -> None:
+        super().__init__(
+            [Parameter("G", G, unit="m^3/(kg s^2)"), Parameter("eps", eps, unit="m", at_least=0)], on, enabled
+        )
+
+    @staticmethod
+    def law(x1: Any, v1: Any, m1: Any, x2: Any, v2: Any, m2: Any, t: Any, G: Any, eps: Any) -> Any:
+        """Force of particle 2 on particle 1 [N]."""
+        d = fn.sub(x1, x2)
+        r2 = fn.dot(d, d) + eps * eps
+        return fn.scale(-G * (m1 * m2) / (r2 * fn.sqrt(r2)), d)
+
+    @staticmethod
+    def potential(x1: Any, v1: Any, m1: Any, x2: Any, v2: Any, m2: Any, t: Any, G: Any, eps: Any) -> Any:
+        """Energy of the pair [J]."""
+        d = fn.sub(x1, x2)
+        return -G * (m1 * m2) / fn.sqrt(fn.dot(d, d) + eps * eps)

@@ -1,0 +1,95 @@
+"""Forces that are NumPy functions of whole arrays: for what a law of scalars cannot say. Reference path only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from pointmass.errors import InvalidInput
+from pointmass.laws.force import Array, Blocks, Force
+from pointmass.particles import Particles, Selection
+
+Function = Callable[..., Any]
+
+
+class ArrayForce(Force):
+    """Any function of the whole state.
+
+    Parameters
+    ----------
+    function : `function(x, v, m, t, **constants) -> f`: x, v, f of shape (n, 3), m of shape (n,). It must be pure. Each
+        particle's force may depend on that particle only (`coupled=False`) or on all of them (`coupled=True`).
+    constants : passed to the function by name.
+    coupled : whether particles act on each other.
+    on, enabled : as for every force; the function sees the selected rows.
+
+    Notes
+    -----
+    It is not compiled, and implicit solvers see its Jacobian by finite differences (uncoupled ones only).
+    """
+
+    def __init__(
+        self,
+        function: Function,
+        *,
+        constants: dict[str, Any] | None = None,
+        coupled: bool = False,
+        on: Selection = None,
+        enabled: bool = True,
+    ) -> None:
+        super().__init__((), on, enabled)
+        self.function = function
+        self.constants = dict(constants or {})
+        self.coupled = coupled
+
+    @property
+    def name(self) -> str:
+        return getattr(self.function, "__name__", "ArrayForce")
+
+    @property
+    def velocity_dependent(self) -> bool:
+        return True
+
+    def bind(self, particles: Particles) -> None:
+        particles.select(self.on)
+
+    def add_forces(self, particles: Particles, t: Any, x: Array, v: Array, f: Array) -> None:
+        rows = particles.select(self.on)
+        f[rows] += self._evaluate(particles, t, x, v, rows)
+
+    def add_jacobian(self, particles: Particles, t: Any, x: Array, v: Array, blocks: Blocks) -> None:
+        if self.coupled:
+            raise InvalidInput(
+                f"{self.name} couples particles in NumPy: implicit solvers need a law; use pm.spring_force or an explicit solver"
+            )
+        rows = particles.select(self.on)
+        result = np.empty((2, len(rows), 3, 3), x.dtype)
+        step = np.cbrt(np.finfo(x.dtype).eps)
+        for which, q in enumerate((x, v)):
+            for axis in range(3):
+                h = step * np.maximum(1.0, np.abs(q[:, axis]))
+                high, low = q.copy(), q.copy()
+                high[:, axis] += h
+                low[:, axis] -= h
+                states = ((high, v), (low, v)) if which == 0 else ((x, high), (x, low))
+                up, down = (self._evaluate(particles, t, a, b, rows) for a, b in states)
+                result[which, :, :, axis] = (up - down) / (2 * h[rows, None])
+        blocks.add(rows, rows, result[0], result[1])
+
+    def links(self, particles: Particles) -> Any:
+        rows = particles.select(self.on)
+        return np.stack([rows[:-1], rows[1:]], axis=1) if self.coupled else super().links(particles)
+
+    def _evaluate(self, particles: Particles, t: Any, x: Array, v: Array, rows: Any) -> Array:
+        now = t[rows] if isinstance(t, np.ndarray) else t
+        result = np.asarray(self.function(x[rows], v[rows], particles.m[rows], now, **self.constants))
+        if result.shape != (len(rows), 3):
+            raise InvalidInput(f"{self.name} must return an array of shape ({len(rows)}, 3), not {result.shape}")
+        return result
+
+
+def array_force(function: Function) -> ArrayForce:
+    """Make a force from a NumPy function of whole arrays: see `ArrayForce`."""
+    return ArrayForce(function)

@@ -1,0 +1,78 @@
+"""Exact derivatives of a program, by forward differentiation: one table, one rule per operation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from pointmass.laws import functions as fn
+from pointmass.laws.program import Program, Symbol, operands
+
+Rule = Callable[..., Any]  # (result, *operands, *their derivatives) -> derivative of the result
+
+
+def _sqrt(r: Symbol, a: Symbol, da: Any) -> Any:
+    return fn.where(r > 0.0, 0.5 * da / fn.where(r > 0.0, r, 1.0), 0.0)
+
+
+def _pow(r: Symbol, a: Symbol, b: Symbol, da: Any, db: Any) -> Any:
+    return b * fn.operation("pow", a, b - 1.0) * da + fn.where(a > 0.0, r * fn.log(fn.where(a > 0.0, a, 1.0)) * db, 0.0)
+
+
+def _atan2(r: Symbol, y: Symbol, x: Symbol, dy: Any, dx: Any) -> Any:
+    return (x * dy - y * dx) * fn.inverse(x * x + y * y)
+
+
+RULES: dict[str, Rule] = {
+    "add": lambda r, a, b, da, db: da + db,
+    "sub": lambda r, a, b, da, db: da - db,
+    "mul": lambda r, a, b, da, db: da * b + a * db,
+    "div": lambda r, a, b, da, db: (da - r * db) / b,
+    "neg": lambda r, a, da: -da,
+    "abs": lambda r, a, da: fn.where(a < 0.0, -da, da),
+    "min": lambda r, a, b, da, db: fn.where(b < a, db, da),
+    "max": lambda r, a, b, da, db: fn.where(a < b, db, da),
+    "where": lambda r, c, a, b, dc, da, db: fn.where(c, da, db),
+    "sqrt": _sqrt,
+    "sin": lambda r, a, da: fn.cos(a) * da,
+    "cos": lambda r, a, da: -fn.sin(a) * da,
+    "exp": lambda r, a, da: r * da,
+    "log": lambda r, a, da: da / a,
+    "pow": _pow,
+    "atan2": _atan2,
+}
+FLAT = {"const", "arg", "floor", "lt", "le", "eq", "and", "or", "not"}  # derivative 0 wherever they have one
+
+
+def differentiate(program: Program, outputs: Sequence[int], name: str) -> list[int]:
+    """Nodes of d(output)/d(argument `name`), added to the same program."""
+    zero = program.constant(0.0)
+    known: dict[int, int] = {}
+    for i in range(max(outputs, default=-1) + 1):
+        known[i] = _node_derivative(program, i, name, known, zero)
+    return [known[o] for o in outputs]
+
+
+def jacobian(program: Program, arguments: Sequence[str]) -> Program:
+    """A program whose outputs are d(output o)/d(argument a), row by row (o major)."""
+    rows = [differentiate(program, program.outputs, name) for name in arguments]
+    return Program(program.nodes, [rows[a][o] for o in range(len(program.outputs)) for a in range(len(arguments))])
+
+
+def _node_derivative(program: Program, i: int, name: str, known: dict[int, int], zero: int) -> int:
+    op, *_ = node = program.nodes[i]
+    if op == "arg" and node[1] == name:
+        return program.constant(1.0)
+    inner = [known[o] for o in operands(node)]
+    if op in FLAT or all(d == zero for d in inner):
+        return zero
+    values = [Symbol(program, o) for o in operands(node)]
+    slopes = [Symbol(program, d) for d in inner]
+    if op == "call":
+        total: Any = 0.0
+        for k, slope in enumerate(slopes):
+            if slope.node != zero:
+                part = Symbol(program, program.call(node[1].derivative(k), *operands(node)))
+                total = part * slope + total
+        return values[0].lift(total)
+    return values[0].lift(RULES[op](Symbol(program, i), *values, *slopes))

@@ -1,0 +1,292 @@
+"""Forces on small sets of particles (elements): springs, angles, triangles, hinges.
+
+Each element is evaluated once; its forces are then added to the particles in the order of the elements, so that the
+sum has the same bits on any number of threads.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pointmass.errors import InvalidInput
+from pointmass.laws import functions as fn
+from pointmass.laws.derivative import differentiate
+from pointmass.laws.force import Array, Blocks, Force, Rows, clock, inputs_for, matrix
+from pointmass.laws.parameter import Parameter
+from pointmass.laws.program import Symbol
+from pointmass.laws.trace import Traced, trace, vector_names
+from pointmass.laws.unary import law_parameters, parameters_from
+from pointmass.particles import Particles
+
+
+class ElementForce(Force):
+    """A law of k particles.
+
+    Attributes
+    ----------
+    nodes : particles of one element.
+    ids : particle ids of the elements, shape (e, nodes).
+    law : (x1, v1, ..., xk, vk, t, *parameters) -> the forces on all nodes, or on all but the last, which takes minus
+        their sum.
+
+    Notes
+    -----
+    Elements name particles by id. A fresh set of particles has ids 0, 1, 2, ..., so these are also its rows. An
+    element goes when one of its particles is removed.
+    """
+
+    nodes: ClassVar[int] = 2
+    internal: ClassVar[bool] = True
+    law: Callable[..., Any]
+
+    def __init__(self, ids: ArrayLike, parameters: list[Parameter], enabled: bool = True) -> None:
+        super().__init__(parameters, enabled=enabled)
+        self.ids = _node_ids(type(self).__name__, ids, self.nodes)
+        self._rows: Rows | None = None
+
+    def measure(self) -> Callable[..., Any] | None:
+        """The function of (x1, ..., xk, t, *parameters) that is the element's energy, if it has one."""
+        return None
+
+    @cached_property
+    def traced(self) -> Traced:
+        """The law as a program with 3 outputs for each node."""
+        return trace(self._all_nodes, self._signature(), 3 * self.nodes, self.name)
+
+    @cached_property
+    def traced_energy(self) -> Traced | None:
+        """The energy of an element as a program."""
+        energy = self.measure()
+        if energy is None:
+            return None
+        kept = {n: k for n, k in self._signature().items() if not n.startswith("v")}
+        return trace(energy, kept, 1, f"{self.name} energy")
+
+    @property
+    def velocity_dependent(self) -> bool:
+        return any(name in self.traced.depends_on for name in self._names("v"))
+
+    def bind(self, particles: Particles) -> None:
+        rows = particles.rows(self.ids)
+        if (rows < 0).any():
+            element, node = np.argwhere(rows < 0)[0]
+            raise InvalidInput(f"{self.name} {element} joins particle {self.ids[element, node]}, which does not exist")
+        for p in self.parameters.values():
+            p.check(particles, len(self.ids), "elements")
+            if p.attributes:
+                raise InvalidInput(
+                    f"{p.name} of {self.name} belongs to elements: it may depend on t, not on {sorted(p.attributes)}"
+                )
+        self._rows = rows
+        _ = self.traced
+
+    def rows(self, particles: Particles) -> Rows:
+        """Rows of the particles of each element, shape (e, nodes)."""
+        if self._rows is None:
+            self.bind(particles)
+        assert self._rows is not None
+        return self._rows
+
+    def add_forces(self, particles: Particles, t: Any, x: Array, v: Array, f: Array) -> None:
+        rows = self.rows(particles)
+        if not len(rows):
+            return
+        out = matrix(self.traced.columns(*self._inputs(self.traced, particles, t, x, v)), len(rows), x.dtype)
+        for axis in range(3):
+            np.add.at(f[:, axis], rows.ravel(), out[:, axis::3].ravel())
+
+    def add_jacobian(self, particles: Particles, t: Any, x: Array, v: Array, blocks: Blocks) -> None:
+        rows = self.rows(particles)
+        values = self._jacobian.columns(*self._inputs(self._jacobian, particles, t, x, v))
+        k = self.nodes
+        all_ = matrix(values, len(rows), x.dtype).reshape(-1, k, 3, k, 2, 3)
+        for a in range(k):
+            for b in range(k):
+                blocks.add(rows[:, a], rows[:, b], all_[:, a, :, b, 0], all_[:, a, :, b, 1])
+
+    def energy(self, particles: Particles, t: float, x: Array, v: Array) -> float | None:
+        if self.traced_energy is None:
+            return None
+        (value,) = self.traced_energy.columns(*self._inputs(self.traced_energy, particles, t, x, v))
+        return float(np.sum(np.broadcast_to(value, len(self.ids)), dtype=np.float64))
+
+    def links(self, particles: Particles) -> Rows:
+        rows = self.rows(particles)
+        return np.concatenate([rows[:, [0, b]] for b in range(1, self.nodes)])
+
+    def partners(self, particles: Particles, row: int) -> list[int]:
+        rows = self.rows(particles)
+        return sorted({int(r) for r in rows[(rows == row).any(axis=1)].ravel()} - {row})
+
+    def keep(self, particles: Particles, mask: NDArray[np.bool_]) -> None:
+        whole = mask[self.rows(particles)].all(axis=1)
+        self.ids = self.ids[whole]
+        self._rows = None
+        for p in self.parameters.values():
+            p.keep(whole)
+
+    def shifted(self, offset: int) -> ElementForce:
+        """Name particles `offset` higher: for bodies that are put together. Returns itself."""
+        self.ids = self.ids + offset
+        self._rows = None
+        return self
+
+    @cached_property
+    def _jacobian(self) -> Traced:
+        names = [n for a in range(self.nodes) for q in "xv" for n in vector_names(f"{q}{a + 1}")]
+        return self.traced.jacobian(*names)
+
+    def _names(self, quantity: str) -> list[str]:
+        return [f"{quantity}{a + 1}" for a in range(self.nodes)]
+
+    def _signature(self) -> dict[str, str]:
+        state = {f"{q}{a + 1}": "vector" for a in range(self.nodes) for q in "xv"}
+        return state | {"t": "scalar"} | {p.name: "vector" if p.vector else "scalar" for p in self.parameters.values()}
+
+    def _all_nodes(self, *arguments: Any) -> Any:
+        forces = self.law(*arguments)
+        parts = forces if isinstance(forces[0], (tuple, list)) else [forces]
+        if len(parts) == self.nodes - 1:
+            total = parts[0]
+            for part in parts[1:]:
+                total = fn.add(total, part)
+            parts = [*parts, tuple(-c for c in total)]
+        return parts
+
+    def _inputs(self, law: Traced, particles: Particles, t: Any, x: Array, v: Array) -> list[Any]:
+        rows = self.rows(particles)
+        now = clock(t, rows[:, 0], x.dtype)
+        vectors = {f"{n}{a + 1}": q[rows[:, a]] for a in range(self.nodes) for n, q in (("x", x), ("v", v))}
+        everything = np.arange(len(rows))
+        parameters = {p.name: p.of(particles, now, everything) for p in self.parameters.values()}
+        return inputs_for(law, vectors, {"t": now}, parameters)
+
+
+class ConstraintForce(ElementForce):
+    """A damped spring of any scalar C(x1, ..., xk): a length, an angle, a volume.
+
+    `f_a = -[k_s (C - rest) + k_d dC/dt] dC/dx_a`, with `dC/dt = sum_a dC/dx_a . v_a` (Witkin, Particle System Dynamics,
+    section on energy functions): force, damping, energy and Jacobian follow from C alone. Parameters are
+    named k_s, k_d and rest.
+    """
+
+    @staticmethod
+    @abstractmethod
+    def constraint(*x: Any) -> Any:
+        """C(x1, ..., xk), one number."""
+
+    def law(self, *arguments: Any) -> Any:
+        """The forces on all nodes."""
+        *state, _t, k_s, k_d, rest = arguments
+        x, v = state[0::2], state[1::2]
+        c = self.constraint(*x)
+        slopes = [gradient(c, node) for node in x]
+        rate: Any = 0.0
+        for slope, velocity in zip(slopes, v, strict=True):
+            rate = rate + fn.dot(slope, velocity)
+        tension = k_s * (c - rest) + k_d * rate
+        return [fn.scale(-tension, slope) for slope in slopes]
+
+    def measure(self) -> Callable[..., Any]:
+        """E = k_s (C - rest)^2 / 2."""
+
+        def energy(*arguments: Any) -> Any:
+            *x, _t, k_s, _k_d, rest = arguments
+            return 0.5 * k_s * (self.constraint(*x) - rest) ** 2
+
+        return energy
+
+    def values(self, particles: Particles, x: Array) -> Array:
+        """C of each element, shape (e,)."""
+        names = dict.fromkeys(self._names("x"), "vector")
+        traced = trace(self.constraint, names, 1, self.name)
+        rows = self.rows(particles)
+        inputs = inputs_for(traced, {n: x[rows[:, a]] for a, n in enumerate(names)}, {}, {})
+        return matrix(traced.columns(*inputs), len(rows), x.dtype)[:, 0]
+
+
+def gradient(value: Symbol, vector: tuple[Symbol, Symbol, Symbol]) -> tuple[Symbol, Symbol, Symbol]:
+    """Exact gradient of a traced number with respect to a vector argument of the law."""
+    program = value.program
+    slopes = (differentiate(program, [value.node], program.nodes[c.node][1])[0] for c in vector)
+    return tuple(Symbol(program, s) for s in slopes)  # type: ignore[return-value]
+
+
+def spring_force(law: Callable[..., Any]) -> type[ElementForce]:
+    """Make a force between pairs of particles from a law.
+
+    Parameters
+    ----------
+    law : `law(x1, v1, x2, v2, t, *parameters) -> fx, fy, fz`, the force on the first particle [N]; the second takes
+        the opposite. Positions and velocities are tuples of three numbers. It is called once, on symbols.
+
+    Returns
+    -------
+    type
+        A class of forces; its constructor takes `pairs` (ids, shape (e, 2)) and the law's parameters by name.
+
+    Examples
+    --------
+    >>> @pm.spring_force
+    ... def rubber(x1, v1, x2, v2, t, k=50.0, rest=1.0):
+    ...     d = pm.sub(x1, x2)
+    ...     stretch = pm.maximum(pm.length(d) - rest, 0.0)  # it pulls and never pushes
+    ...     return pm.scale(-k * stretch * pm.inverse(pm.length(d)), d)
+    >>> system = pm.ParticleSystem(particles, forces=[rubber(pairs=[(0, 1), (1, 2)], k=80.0)])
+    """
+    return element_force(2)(law)
+
+
+def element_force(nodes: int) -> Callable[[Callable[..., Any]], type[ElementForce]]:
+    """Make a force between sets of `nodes` particles: like `spring_force`, for (x1, v1, ..., xk, vk, t, *parameters).
+
+    The law returns the forces on all nodes, or on all but the last, which takes minus their sum.
+    """
+
+    def decorate(law: Callable[..., Any]) -> type[ElementForce]:
+        fixed = [f"{q}{a + 1}" for a in range(nodes) for q in "xv"] + ["t"]
+        own = law_parameters(law, fixed)
+        argument = "pairs" if nodes == 2 else "elements"
+
+        def __init__(self: Any, *, enabled: bool = True, **given: Any) -> None:
+            if argument not in given:
+                raise InvalidInput(f"law {law.__name__!r} needs {argument!r}: ids of particles, shape (e, {nodes})")
+            ids = given.pop(argument)
+            ElementForce.__init__(self, ids, parameters_from(law, own, given), enabled=enabled)
+
+        body = {
+            "__init__": __init__,
+            "law": staticmethod(law),
+            "nodes": nodes,
+            "__doc__": law.__doc__,
+            "__module__": law.__module__,
+        }
+        return type(law.__name__, (ElementForce,), body)
+
+    return decorate
+
+
+def _node_ids(name: str, ids: ArrayLike, nodes: int) -> NDArray[np.int64]:
+    try:
+        array = np.asarray(ids)
+        array = array.reshape(0, nodes).astype(np.int64) if array.size == 0 else array
+    except ValueError:
+        array = np.zeros(0)
+    if array.ndim != 2 or array.shape[1] != nodes or not np.issubdtype(array.dtype, np.integer):
+        raise InvalidInput(f"{name} needs {nodes} particle ids for each element, shape (e, {nodes})")
+    ordered = np.sort(array, axis=1)
+    twice = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
+    if twice.any():
+        element = int(np.argmax(twice))
+        raise InvalidInput(f"{name} {element} joins particle {_repeated(ordered[element])} with itself")
+    return array.astype(np.int64)
+
+
+def _repeated(ordered: NDArray[np.integer[Any]]) -> int:
+    return int(ordered[1:][ordered[1:] == ordered[:-1]][0])

@@ -1,0 +1,149 @@
+"""What every force is, whatever it couples: it adds to accumulators and never overwrites them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.description import Described
+from pointmass.laws.parameter import Parameter
+from pointmass.laws.trace import Traced, vector_names
+from pointmass.particles import Particles, Selection
+
+Array = NDArray[np.floating[Any]]
+Rows = NDArray[np.intp]
+
+
+@dataclass
+class Blocks:
+    """A sparse Jacobian under construction: 3x3 blocks at (row particle, column particle)."""
+
+    rows: list[Rows] = field(default_factory=list)
+    columns: list[Rows] = field(default_factory=list)
+    dx: list[Array] = field(default_factory=list)
+    dv: list[Array] = field(default_factory=list)
+
+    def add(self, rows: Rows, columns: Rows, dx: Array, dv: Array) -> None:
+        """Add blocks df/dx and df/dv, each of shape (k, 3, 3)."""
+        self.rows.append(rows)
+        self.columns.append(columns)
+        self.dx.append(dx)
+        self.dv.append(dv)
+
+    def matrices(self, n: int) -> tuple[Any, Any]:
+        """df/dx and df/dv as scipy.sparse CSR arrays of shape (3n, 3n)."""
+        from scipy.sparse import csr_array
+
+        if not self.rows:
+            return csr_array((3 * n, 3 * n)), csr_array((3 * n, 3 * n))
+        axis = np.arange(3)
+        i = (3 * np.concatenate(self.rows)[:, None, None] + axis[:, None] + 0 * axis).ravel()
+        j = (3 * np.concatenate(self.columns)[:, None, None] + 0 * axis[:, None] + axis).ravel()
+        return tuple(  # type: ignore[return-value]
+            csr_array((np.concatenate(values).ravel(), (i, j)), shape=(3 * n, 3 * n)) for values in (self.dx, self.dv)
+        )
+
+
+class Force(Described, ABC):
+    """A law with its parameters, acting on a selection of particles.
+
+    Attributes
+    ----------
+    order : 2: adds forces [N] to particles with mass; 1: adds velocities [m/s] in a flow.
+    internal : whether the forces of the law sum to zero (action and reaction).
+    parameters : by name; `set` changes them.
+    on : particles that it acts on; None = all.
+    enabled : whether it acts at all.
+    """
+
+    order: ClassVar[int] = 2
+    internal: ClassVar[bool] = False
+
+    def __init__(self, parameters: Sequence[Parameter] = (), on: Selection = None, enabled: bool = True) -> None:
+        self.parameters = {p.name: p for p in parameters}
+        self.on = on
+        self.enabled = bool(enabled)
+
+    @property
+    def name(self) -> str:
+        """Name for messages."""
+        return type(self).__name__
+
+    @property
+    @abstractmethod
+    def velocity_dependent(self) -> bool:
+        """Whether the law depends on velocities."""
+
+    @abstractmethod
+    def bind(self, particles: Particles) -> None:
+        """Check the force against the particles that it will act on.
+
+        Raises
+        ------
+        InvalidInput
+            A particle, attribute or group that does not exist, a column of another length.
+        """
+
+    @abstractmethod
+    def add_forces(self, particles: Particles, t: Any, x: Array, v: Array, f: Array) -> None:
+        """Add the force at (t, x, v) to the accumulators `f`, shape (n, 3). `t` is a number or one for each particle."""
+
+    @abstractmethod
+    def add_jacobian(self, particles: Particles, t: Any, x: Array, v: Array, blocks: Blocks) -> None:
+        """Add df/dx and df/dv at (t, x, v)."""
+
+    def energy(self, particles: Particles, t: float, x: Array, v: Array) -> float | None:
+        """Potential energy [J], or None for a law that has none."""
+        return None
+
+    def links(self, particles: Particles) -> Rows:
+        """Pairs of rows that the force couples, shape (k, 2): what makes islands."""
+        return np.zeros((0, 2), np.intp)
+
+    def partners(self, particles: Particles, row: int) -> list[int]:
+        """Rows that act on the particle in `row` through this force, for messages."""
+        return []
+
+    def keep(self, particles: Particles, mask: NDArray[np.bool_]) -> None:
+        """Follow the removal of particles; called before it happens."""
+        if self.on is not None and not isinstance(self.on, str):
+            selected = np.zeros(len(mask), bool)
+            selected[particles.select(self.on)] = True
+            self.on = selected[mask]
+
+    def grow(self, particles: Particles, count: int) -> None:
+        """Follow the birth of `count` particles, already added at the end."""
+        if self.on is not None and not isinstance(self.on, str):
+            selected = np.zeros(len(particles), bool)
+            selected[: len(particles) - count][Particles.select(particles, self.on)] = True
+            self.on = selected
+
+
+def inputs_for(
+    traced: Traced, vectors: dict[str, Array], scalars: dict[str, Any], parameters: dict[str, tuple[Any, ...]]
+) -> list[Any]:
+    """The columns that a traced law takes, in its order."""
+    values = dict(scalars)
+    for name, array in vectors.items():
+        values |= zip(vector_names(name), array.T, strict=True)
+    for name, parts in parameters.items():
+        values |= zip(vector_names(name) if len(parts) == 3 else (name,), parts, strict=True)
+    return [values[i] for i in traced.inputs]
+
+
+def clock(t: Any, rows: Any, dtype: Any) -> Any:
+    """The time of each of `rows`: t itself, or its entries where each particle has a clock of its own."""
+    return t[rows].astype(dtype) if isinstance(t, np.ndarray) else float(t)
+
+
+def matrix(values: Sequence[Any], count: int, dtype: Any) -> Array:
+    """Outputs of a Jacobian as an array of shape (count, len(values))."""
+    result = np.empty((count, len(values)), dtype)
+    for k, column in enumerate(values):
+        result[:, k] = column
+    return result

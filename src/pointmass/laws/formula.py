@@ -1,0 +1,147 @@
+"""Formulas of scene files, such as "-k*x" or "sin(t)*y": parsed into the same programs as laws written in Python.
+
+The text is read with Python's own parser and only arithmetic, comparisons, `a if c else b`, known names and known
+functions are accepted; nothing is ever evaluated as Python.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from pointmass.errors import InvalidInput, unknown
+from pointmass.laws import functions as fn
+
+FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
+    "sin": (fn.sin, 1),
+    "cos": (fn.cos, 1),
+    "tan": (fn.tan, 1),
+    "exp": (fn.exp, 1),
+    "log": (fn.log, 1),
+    "sqrt": (fn.sqrt, 1),
+    "abs": (fn.absolute, 1),
+    "floor": (fn.floor, 1),
+    "pow": (fn.pow, 2),
+    "atan2": (fn.atan2, 2),
+    "min": (fn.minimum, 2),
+    "max": (fn.maximum, 2),
+    "where": (fn.where, 3),
+}
+CONSTANTS = {"pi": math.pi, "e": math.e}
+BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: lambda a, b: a + b,
+    ast.Sub: lambda a, b: a - b,
+    ast.Mult: lambda a, b: a * b,
+    ast.Div: lambda a, b: a / b,
+    ast.Pow: fn.pow,
+}
+COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+    ast.Lt: lambda a, b: a < b,
+    ast.LtE: lambda a, b: a <= b,
+    ast.Gt: lambda a, b: a > b,
+    ast.GtE: lambda a, b: a >= b,
+    ast.Eq: lambda a, b: a == b,
+    ast.NotEq: lambda a, b: a != b,
+}
+LONGEST = 2000  # characters; a formula is a line, and the parser's stack has an end
+
+
+class Formula:
+    """A parsed formula.
+
+    Parameters
+    ----------
+    text : such as "-k*x".
+    names : what the formula may refer to besides functions, `pi` and `e`; None = anything (checked on use).
+
+    Raises
+    ------
+    InvalidInput
+        Not a formula, or a name or function that is not known; the known ones are listed.
+    """
+
+    def __init__(self, text: str, names: Iterable[str] | None = None, what: str = "formula") -> None:
+        self.text = str(text).strip()
+        self.what = what
+        if not self.text or len(self.text) > LONGEST:
+            raise InvalidInput(f"{what} must be a formula of 1 to {LONGEST} characters, not {self.text[:20]!r}")
+        try:
+            self._tree = ast.parse(self.text, mode="eval").body
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            raise InvalidInput(f"{what} {self.text!r} is not a formula; write it like -k*x + sin(t)") from None
+        self.names: set[str] = set()
+        self._check(self._tree)
+        if names is not None:
+            self.restrict(names)
+
+    def restrict(self, names: Iterable[str]) -> None:
+        """Refuse a formula that refers to anything else than `names`."""
+        known = set(names)
+        for name in sorted(self.names - known):
+            raise unknown(f"name in {self.what} {self.text!r}:", name, [*known, *CONSTANTS, *FUNCTIONS])
+
+    def __call__(self, values: Mapping[str, Any]) -> Any:
+        """The value, for numbers, arrays or symbols by name."""
+        return self._value(self._tree, values)
+
+    def _check(self, node: ast.expr) -> None:
+        match node:
+            case ast.Constant(value=bool()):
+                raise self._refused("True and False")
+            case ast.Constant(value=int() | float()):
+                return
+            case ast.Name(id=name):
+                if name not in CONSTANTS:
+                    self.names.add(name)
+            case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=inner):
+                self._check(inner)
+            case ast.BinOp(left=a, op=op, right=b) if type(op) in BINARY:
+                self._check(a)
+                self._check(b)
+            case ast.Compare(left=a, ops=[op], comparators=[b]) if type(op) in COMPARE:
+                self._check(a)
+                self._check(b)
+            case ast.IfExp(test=c, body=a, orelse=b):
+                for part in (c, a, b):
+                    self._check(part)
+            case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
+                if name not in FUNCTIONS:
+                    raise unknown(f"function in {self.what} {self.text!r}:", name, FUNCTIONS)
+                if len(arguments) != FUNCTIONS[name][1]:
+                    raise InvalidInput(f"{name} in {self.what} {self.text!r} takes {FUNCTIONS[name][1]} argument(s)")
+                for part in arguments:
+                    self._check(part)
+            case _:
+                raise self._refused(type(node).__name__)
+
+    def _refused(self, thing: str) -> InvalidInput:
+        return InvalidInput(
+            f"{self.what} {self.text!r} may use numbers, names, + - * / **, comparisons, `a if c else b` "
+            f"and {', '.join(FUNCTIONS)}, but not {thing}"
+        )
+
+    def _value(self, node: ast.expr, values: Mapping[str, Any]) -> Any:
+        match node:
+            case ast.Constant(value=number):
+                return float(number)  # type: ignore[arg-type]
+            case ast.Name(id=name):
+                return CONSTANTS[name] if name in CONSTANTS else values[name]
+            case ast.UnaryOp(op=op, operand=inner):
+                return -self._value(inner, values) if isinstance(op, ast.USub) else self._value(inner, values)
+            case ast.BinOp(left=a, op=op, right=b):
+                return self._arithmetic(op, self._value(a, values), self._value(b, values))
+            case ast.Compare(left=a, ops=[op], comparators=[b]):
+                return COMPARE[type(op)](self._value(a, values), self._value(b, values))
+            case ast.IfExp(test=c, body=a, orelse=b):
+                return fn.where(*(self._value(part, values) for part in (c, a, b)))
+            case ast.Call(func=ast.Name(id=name), args=arguments):
+                return FUNCTIONS[name][0](*(self._value(part, values) for part in arguments))
+        raise AssertionError(node)
+
+    def _arithmetic(self, op: ast.operator, a: Any, b: Any) -> Any:
+        try:
+            return BINARY[type(op)](a, b)
+        except (ZeroDivisionError, OverflowError):
+            raise InvalidInput(f"{self.what} {self.text!r} divides by zero or overflows") from None

@@ -1,0 +1,142 @@
+"""Parameters of laws: a number, a column, a formula of particle attributes and time, or a function of time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.errors import InvalidInput, finite_array, number
+from pointmass.laws.formula import Formula
+from pointmass.laws.trace import Traced, trace
+from pointmass.particles import Particles
+
+Scalar = float | str | Callable[[Any], Any] | Sequence[float] | NDArray[np.floating[Any]]
+Vector = Sequence[Any] | Callable[[Any], Any] | NDArray[np.floating[Any]]
+Rows = NDArray[np.intp]
+
+
+class Component:
+    """One number of a parameter: a constant, a column, or a program of t and particle attributes."""
+
+    def __init__(self, name: str, value: Any, bounds: dict[str, float], unit: str) -> None:
+        self.name = name
+        self.value: float | NDArray[np.float64] | Traced
+        self.needs: tuple[str, ...] = ()
+        if isinstance(value, str):
+            formula = Formula(value, what=name)
+            self.needs = tuple(sorted(formula.names - {"t"}))
+            names = ("t", *self.needs)
+            arguments = dict.fromkeys(names, "scalar")
+            self.value = trace(lambda *v: formula(dict(zip(names, v, strict=True))), arguments, 1, name)
+        elif callable(value):
+            self.value = trace(value, {"t": "scalar"}, 1, name)
+        elif np.ndim(value) == 1:
+            self.value = finite_array(name, value, (None,))
+            for extreme in (self.value.min(), self.value.max()) if self.value.size else ():
+                number(name, extreme, unit=unit, **bounds)
+        else:
+            self.value = number(name, value, unit=unit, **bounds)
+
+    def of(self, particles: Particles, t: Any, rows: Rows) -> Any:
+        """The number, or one for each of `rows`."""
+        if isinstance(self.value, Traced):
+            columns = (particles.column(n)[rows] for n in self.needs)
+            return self.value.columns(t, *columns)[0]
+        if isinstance(self.value, np.ndarray):
+            return self.value[rows].astype(particles.dtype)
+        return self.value
+
+    def rate(self) -> Component:
+        """d/dt of the component."""
+        result = Component(f"d {self.name}/dt", 0.0, {}, "")
+        if isinstance(self.value, Traced):
+            result.value, result.needs = self.value.jacobian("t"), self.needs
+        return result
+
+
+class Parameter:
+    """A named input of a law.
+
+    Parameters
+    ----------
+    name : as in the law's signature.
+    value : scalar: a number, a column, a formula such as "0.1*radius" or "1 + sin(t)", or a function of t;
+        vector: three of these, a column of shape (n, 3), or a function of t that returns three numbers.
+    vector : whether the law takes it as a tuple of three.
+    unit : for messages.
+    bounds : `above`, `at_least`, `at_most`, as for `errors.number`.
+    """
+
+    def __init__(self, name: str, value: Any, *, vector: bool = False, unit: str = "", **bounds: float) -> None:
+        self.name = name
+        self.vector = vector
+        self.unit = unit
+        self.components = [
+            Component(f"{name}.{axis}" if vector else name, part, bounds, unit)
+            for axis, part in zip("xyz" if vector else " ", self._parts(value), strict=True)
+        ]
+
+    def of(self, particles: Particles, t: Any, rows: Rows) -> tuple[Any, ...]:
+        """The numbers of the parameter, each a float or one value for each of `rows`."""
+        return tuple(c.of(particles, t, rows) for c in self.components)
+
+    def at(self, t: Any) -> tuple[Any, ...]:
+        """The numbers at time t, for a parameter that knows no particles."""
+        return tuple(c.value.columns(t)[0] if isinstance(c.value, Traced) else c.value for c in self.components)
+
+    def rate(self) -> Parameter:
+        """The parameter's rate of change, exact, from the program of its formula."""
+        result = Parameter.__new__(Parameter)
+        result.name, result.vector, result.unit = f"d {self.name}/dt", self.vector, f"{self.unit}/s"
+        result.components = [c.rate() for c in self.components]
+        return result
+
+    @property
+    def constant(self) -> bool:
+        """Whether it is the same at all times and for all particles."""
+        return all(isinstance(c.value, float) for c in self.components)
+
+    @property
+    def common(self) -> bool:
+        """Whether it is the same for all particles (a number or a function of t)."""
+        return all(isinstance(c.value, float) or (isinstance(c.value, Traced) and not c.needs) for c in self.components)
+
+    @property
+    def attributes(self) -> set[str]:
+        """Particle attributes that it reads."""
+        return {n for c in self.components for n in c.needs}
+
+    def check(self, particles: Particles, count: int, what: str) -> None:
+        """Refuse a column of another length, and attributes that the particles do not have."""
+        for c in self.components:
+            if isinstance(c.value, np.ndarray) and len(c.value) != count:
+                raise InvalidInput(f"{c.name} has {len(c.value)} values for {count} {what}")
+            if isinstance(c.value, Traced):
+                Formula("+".join(c.needs) or "0", ["t", *particles.columns], what=c.name)
+
+    def keep(self, mask: NDArray[np.bool_]) -> None:
+        """Keep the rows of a mask in columns of numbers."""
+        for c in self.components:
+            if isinstance(c.value, np.ndarray):
+                c.value = c.value[mask]
+
+    def _parts(self, value: Any) -> list[Any]:
+        if not self.vector:
+            return [value]
+        if callable(value):
+            return [lambda t, k=k: value(t)[k] for k in range(3)]
+        if not isinstance(value, str) and np.ndim(_numbers(value)) == 2:
+            return list(finite_array(self.name, value, (None, 3)).T)
+        if isinstance(value, str) or not hasattr(value, "__len__") or len(value) not in (2, 3):
+            raise InvalidInput(f"{self.name} must be three numbers or formulas, not {value!r}")
+        return [*value, 0.0][:3]
+
+
+def _numbers(value: Any) -> Any:
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        return 0.0

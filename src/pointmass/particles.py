@@ -1,0 +1,258 @@
+"""Particles: position, velocity, mass and a force accumulator each (lecture, "Particle structure")."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from pointmass.errors import InvalidInput, finite_array, unknown
+
+Array = NDArray[np.floating[Any]]
+Selection = str | ArrayLike | None  # a group's name, a mask, rows; None = all
+FIELDS = ("x", "v", "f", "m", "w", "age", "radius", "id")
+
+
+class Particles:
+    """Point masses as columns.
+
+    Attributes
+    ----------
+    x, v : positions [m] and velocities [m/s], shape (n, 3).
+    f : force accumulators [N] (order 1: velocity accumulators [m/s]), shape (n, 3).
+    m : masses [kg], shape (n,), positive.
+    w : inverse masses [1/kg], shape (n,); 0 = pinned.
+    radius : [m], shape (n,); a particle touches a collider at this distance.
+    age : [s], shape (n,).
+    id : shape (n,), int64; never used again once a particle is gone.
+    version : counts changes of the structure (add, remove, pin, groups), so that what is derived from it can be kept.
+
+    Parameters
+    ----------
+    x : shape (n, 3), or (n, 2) for a plane (z = 0), or one point.
+    v : like `x`, or one vector for all; at rest by default.
+    m, radius : numbers or shape (n,).
+    dtype : float64 or float32.
+    attributes : further columns by name, numbers or shape (n,): charge, temperature, ...
+
+    Raises
+    ------
+    InvalidInput
+        A shape that does not fit, a number that is not finite, a mass that is not positive.
+    """
+
+    def __init__(
+        self,
+        x: ArrayLike,
+        v: ArrayLike | None = None,
+        m: ArrayLike = 1.0,
+        radius: ArrayLike = 0.0,
+        *,
+        dtype: DTypeLike = np.float64,
+        **attributes: ArrayLike,
+    ) -> None:
+        self.dtype = np.dtype(dtype)
+        if self.dtype not in (np.float64, np.float32):
+            raise InvalidInput(f"dtype = {dtype} is not allowed: it must be float64 or float32")
+        self.attributes: dict[str, Array] = {}
+        self.groups: dict[str, NDArray[np.bool_]] = {}
+        self.version = 0
+        self._next_id = 0
+        empty = np.zeros((0, 3), self.dtype)
+        self.x, self.v, self.f = empty, empty.copy(), empty.copy()
+        self.m, self.w, self.radius, self.age = (np.zeros(0, self.dtype) for _ in range(4))
+        self.id = np.zeros(0, np.int64)
+        for name in attributes:
+            self.attributes[_attribute_name(name)] = np.zeros(0, self.dtype)
+        self.add(x, v, m, radius, **attributes)
+
+    def __len__(self) -> int:
+        return len(self.id)
+
+    def __repr__(self) -> str:
+        return f"<Particles: {len(self)}, {int(self.pinned.sum())} pinned, {self.dtype}>"
+
+    @property
+    def pinned(self) -> NDArray[np.bool_]:
+        """Which particles are held where they are, shape (n,)."""
+        return self.w == 0
+
+    def add(
+        self,
+        x: ArrayLike,
+        v: ArrayLike | None = None,
+        m: ArrayLike = 1.0,
+        radius: ArrayLike = 0.0,
+        *,
+        id: ArrayLike | None = None,
+        **attributes: ArrayLike,
+    ) -> NDArray[np.int64]:
+        """Append particles; returns their ids. Attributes that are not given are 0.
+
+        Raises
+        ------
+        InvalidInput
+            As for the constructor, and an attribute that the other particles do not have.
+        """
+        x = _points("x", x)
+        n = len(x)
+        v = np.zeros((n, 3)) if v is None else _points("v", v, n)
+        m, radius = _column("m", m, n), _column("radius", radius, n)
+        if (m <= 0).any():
+            worst = int(np.argmax(m <= 0))
+            raise InvalidInput(
+                f"m = {m[worst]} of particle {worst} is not allowed: a mass is positive; to hold a particle, pin it"
+            )
+        if (radius < 0).any():
+            raise InvalidInput(f"radius = {radius.min()} is not allowed: it must be at least 0 [m]")
+        for name in attributes:
+            if name not in self.attributes:
+                raise unknown("particle attribute", name, self.attributes)
+        columns = {name: _column(name, attributes.get(name, 0.0), n) for name in self.attributes}
+        ids = self._new_ids(n, id)
+        new: dict[str, Array] = {
+            "x": x,
+            "v": v,
+            "f": np.zeros((n, 3)),
+            "m": m,
+            "w": 1 / m,
+            "radius": radius,
+            "age": np.zeros(n),
+        }
+        for name, values in new.items():
+            setattr(self, name, np.concatenate([getattr(self, name), values]).astype(self.dtype))
+        for name, values in columns.items():
+            self.attributes[name] = np.concatenate([self.attributes[name], values]).astype(self.dtype)
+        for name, mask in self.groups.items():
+            self.groups[name] = np.concatenate([mask, np.zeros(n, bool)])
+        self.id = np.concatenate([self.id, ids])
+        self.version += 1
+        return ids
+
+    def remove(self, which: Selection) -> None:
+        """Take particles away; the others keep their order, ids and bits."""
+        gone = np.zeros(len(self), bool)
+        gone[self.select(which)] = True
+        self.keep(~gone)
+
+    def keep(self, mask: NDArray[np.bool_]) -> None:
+        """Keep the particles of a mask, in order."""
+        for name in FIELDS:
+            setattr(self, name, getattr(self, name)[mask])
+        self.attributes = {name: values[mask] for name, values in self.attributes.items()}
+        self.groups = {name: values[mask] for name, values in self.groups.items()}
+        self.version += 1
+
+    def select(self, which: Selection) -> NDArray[np.intp]:
+        """Rows of a selection, ascending.
+
+        Parameters
+        ----------
+        which : a group's name, a mask of shape (n,), rows, or None for all.
+
+        Raises
+        ------
+        InvalidInput
+            No such group, a mask of another length, a row that does not exist.
+        """
+        n = len(self)
+        if which is None:
+            return np.arange(n)
+        if isinstance(which, str):
+            if which not in self.groups:
+                raise unknown("group of particles", which, self.groups)
+            return np.flatnonzero(self.groups[which])
+        rows = np.atleast_1d(np.asarray(which))
+        if rows.dtype == bool:
+            if rows.shape != (n,):
+                raise InvalidInput(f"a mask of particles must have shape ({n},), not {rows.shape}")
+            return np.flatnonzero(rows)
+        if rows.size == 0:
+            return np.zeros(0, np.intp)
+        if not np.issubdtype(rows.dtype, np.integer) or rows.min() < -n or rows.max() >= n:
+            raise InvalidInput(f"rows of particles must be whole numbers below {n}, not {which!r}")
+        return np.unique(rows % n)
+
+    def tag(self, name: str, which: Selection) -> None:
+        """Give a selection a name, to be used wherever particles are selected."""
+        mask = np.zeros(len(self), bool)
+        mask[self.select(which)] = True
+        self.groups[name] = mask
+        self.version += 1
+
+    def pin(self, which: Selection) -> None:
+        """Hold particles where they are: inverse mass 0 (never a large mass), velocity 0."""
+        rows = self.select(which)
+        self.w[rows] = 0
+        self.v[rows] = 0
+        self.version += 1
+
+    def unpin(self, which: Selection) -> None:
+        """Let particles go."""
+        rows = self.select(which)
+        self.w[rows] = 1 / self.m[rows]
+        self.version += 1
+
+    def rows(self, ids: ArrayLike) -> NDArray[np.intp]:
+        """Row of each id; -1 where that particle is gone."""
+        ids = np.asarray(ids)
+        if len(self) == 0:
+            return np.full(ids.shape, -1)
+        order = np.argsort(self.id, kind="stable")
+        place = np.minimum(np.searchsorted(self.id, ids, sorter=order), len(self) - 1)
+        rows = order[place]
+        return np.where(self.id[rows] == ids, rows, -1)
+
+    def column(self, name: str) -> Array:
+        """A column of numbers by name: m, radius, age or a further attribute, shape (n,)."""
+        if name in ("m", "radius", "age"):
+            return getattr(self, name)  # type: ignore[no-any-return]
+        if name not in self.attributes:
+            raise unknown("particle attribute", name, ["m", "radius", "age", *self.attributes])
+        return self.attributes[name]
+
+    @property
+    def columns(self) -> list[str]:
+        """Names that `column` knows."""
+        return ["m", "radius", "age", *self.attributes]
+
+    def _new_ids(self, n: int, ids: ArrayLike | None) -> NDArray[np.int64]:
+        if ids is None:
+            ids = np.arange(self._next_id, self._next_id + n)
+        result = np.asarray(ids, np.int64)
+        if result.shape != (n,) or len(np.unique(result)) != n or np.isin(result, self.id).any():
+            raise InvalidInput(f"id must be {n} numbers that no other particle has")
+        self._next_id = max(self._next_id, int(result.max(initial=-1)) + 1)
+        return result
+
+
+def _attribute_name(name: str) -> str:
+    if not name.isidentifier() or name in (*FIELDS, "t", "y", "z"):
+        raise InvalidInput(
+            f"particle attribute {name!r} is not allowed: use a word that is not {', '.join(FIELDS)}, t, y or z"
+        )
+    return name
+
+
+def _points(name: str, value: ArrayLike, n: int | None = None) -> Array:
+    array = np.atleast_2d(np.asarray(value, dtype=object if _ragged(value) else None))
+    if array.ndim == 2 and array.shape[1] == 2 and array.dtype != object:
+        array = np.column_stack([array, np.zeros(len(array))])
+    if n is not None and array.shape == (1, 3):
+        array = np.repeat(array, n, axis=0)
+    return finite_array(name, array, (n, 3))
+
+
+def _ragged(value: ArrayLike) -> bool:
+    try:
+        np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        return True
+    return False
+
+
+def _column(name: str, value: ArrayLike, n: int) -> Array:
+    if np.ndim(value) == 0:
+        return np.full(n, finite_array(name, value, ()))
+    return finite_array(name, value, (n,))

@@ -1,0 +1,251 @@
+"""The pin-hole projection, and a camera that finds its own place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.errors import InvalidInput
+from pointmass.frame import Arrows, Camera, Drawable, Floats, Frame, Points, Triangles
+
+Vector = NDArray[np.float64]
+
+MARGIN = 1.12  # the picture is this much larger than what must be seen
+MANY = 1000  # a cloud with more rows than this is measured by its percentiles
+PERCENTILES = (1.0, 99.0)
+NEAR = 0.002  # nearest visible depth, as a fraction of the distance from the eye to the target
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A camera that stands: world coordinates to view coordinates to pixels.
+
+    View coordinates are x to the right, y up and z away from the eye [m]. Pixel (i, j) covers [i, i+1) x [j, j+1),
+    j downwards.
+
+    Attributes
+    ----------
+    eye : position [m], shape (3,).
+    axes : rows are the unit vectors right, up and forward, shape (3, 3).
+    focal : distance of the image plane [pixels].
+    width, height : size of the picture [pixels].
+    near : things nearer than this depth are not drawn [m].
+    """
+
+    eye: Vector
+    axes: Vector
+    focal: float
+    width: int
+    height: int
+    near: float
+
+    def see(self, positions: Floats) -> Vector:
+        """View coordinates of world positions, shape (n, 3)."""
+        # Written out, because a BLAS product may round differently on another number of threads.
+        return turn(np.asarray(positions, dtype=np.float64) - self.eye, self.axes)
+
+    def project(self, seen: Vector) -> Vector:
+        """Pixel coordinates of view coordinates, shape (n, 2); only meaningful where z > 0."""
+        scale = self.focal / seen[:, 2]
+        return np.stack((0.5 * self.width + scale * seen[:, 0], 0.5 * self.height - scale * seen[:, 1]), axis=1)
+
+
+def turn(vectors: Vector, axes: Vector) -> Vector:
+    """Components of `vectors`, shape (n, 3), along the rows of `axes`, shape (3, 3)."""
+    x, y, z = vectors[:, 0], vectors[:, 1], vectors[:, 2]
+    return np.stack([x * a[0] + y * a[1] + z * a[2] for a in axes], axis=1)
+
+
+def look(camera: Camera, size: tuple[int, int]) -> View:
+    """The view of a camera whose position and target are known.
+
+    Raises
+    ------
+    InvalidInput : position and target coincide, or a number is not finite.
+    """
+    eye = np.asarray(camera.position, dtype=np.float64)
+    target = np.asarray(camera.target, dtype=np.float64)
+    forward = target - eye
+    distance = float(np.linalg.norm(forward))
+    if not (math.isfinite(distance) and distance > 0.0):
+        raise InvalidInput(f"camera.position = {camera.position} must be finite and differ from camera.target")
+    width, height = size
+    focal = 0.5 * height / math.tan(math.radians(camera.fov) / 2.0)
+    return View(eye, _axes(forward / distance, camera.up), focal, width, height, NEAR * distance)
+
+
+def fit_camera(frames: Iterable[Frame], camera: Camera | None = None, size: tuple[int, int] = (1280, 720)) -> Camera:
+    """The camera with its position and target filled in, so that the whole scene is in the picture.
+
+    Everything drawn at the particles' positions counts, in all frames, and so do arrows, points and curves with
+    vertices of their own. A cloud of more than 1000 points counts from the 1st to the 99th percentile of each axis, so
+    one runaway does not shrink the rest. A mesh with its own vertices (a floor) counts only where it is near the rest.
+
+    Parameters
+    ----------
+    frames : what is to be seen; read once.
+    camera : what it has already is kept.
+    size : width and height of the picture [pixels]; only their ratio matters.
+
+    Returns
+    -------
+    Camera : with `position` and `target`.
+    """
+    camera = camera or Camera()
+    if camera.position is not None and camera.target is not None:
+        return camera
+    spots = _interesting(frames)
+    balls, radii = spots[:, :3], spots[:, 3]
+    low, high = balls.min(axis=0), balls.max(axis=0)
+    size_of_all = float(np.linalg.norm(high - low))
+    # A lone particle shall not fill the picture, nor may the camera end inside it.
+    radii = radii + 0.02 * size_of_all
+    if size_of_all <= 4.0 * float(radii.max()):
+        radii = radii + max(1.5 * float(radii.max()), 1e-3 * float(np.abs(balls).max()), 1e-6)
+    middle = 0.5 * (low + high)
+    if camera.position is not None:
+        away = middle - np.asarray(camera.position)
+        target = middle if np.linalg.norm(away) > 0.0 else middle - _direction(camera)
+        return replace(camera, target=_triple(target))
+    axes = _axes(-_direction(camera), camera.up)
+    slope = math.tan(math.radians(camera.fov) / 2.0) / MARGIN
+    slopes = (slope * size[0] / size[1], slope)
+    if camera.target is not None:
+        target = np.asarray(camera.target, dtype=np.float64)
+        distance = _distance(turn(balls - target, axes), radii, slopes)
+        return replace(camera, position=_triple(target - distance * axes[2]))
+    place = _place(turn(balls - middle, axes), radii, slopes)
+    # Aim at the middle of the scene's depth on the optical axis.
+    target = middle + place[0] * axes[0] + place[1] * axes[1]
+    return replace(camera, position=_triple(target + place[2] * axes[2]), target=_triple(target))
+
+
+def _axes(forward: Vector, up: tuple[float, float, float]) -> Vector:
+    """Right, up, forward for a unit vector `forward`; another `up` is taken when the two are parallel."""
+    right = np.cross(forward, np.asarray(up, dtype=np.float64))
+    length = float(np.linalg.norm(right))
+    if not length > 1e-9 * max(float(np.linalg.norm(up)), 1e-300):
+        right = np.cross(forward, (0.0, 0.0, -1.0) if abs(forward[2]) < 0.9 else (1.0, 0.0, 0.0))
+        length = float(np.linalg.norm(right))
+    right = right / length
+    return np.stack((right, np.cross(right, forward), forward))
+
+
+def _direction(camera: Camera) -> Vector:
+    """Unit vector from the scene to an automatic camera: azimuth about the camera's up, 0 looks along -z."""
+    up = np.asarray(camera.up, dtype=np.float64)
+    length = float(np.linalg.norm(up))
+    if not (math.isfinite(length) and length > 0.0):
+        raise InvalidInput(f"camera.up = {camera.up} is not allowed: it must be a finite direction")
+    up = up / length
+    back = np.array((0.0, 0.0, 1.0)) - up[2] * up
+    if np.linalg.norm(back) < 1e-6:
+        back = np.array((0.0, -1.0, 0.0)) + up[1] * up
+    back = back / np.linalg.norm(back)
+    side = np.cross(up, back)
+    azimuth, elevation = math.radians(camera.azimuth), math.radians(camera.elevation)
+    flat = math.cos(azimuth) * back + math.sin(azimuth) * side
+    result: Vector = math.cos(elevation) * flat + math.sin(elevation) * up
+    return result
+
+
+def _place(seen: Vector, radii: Vector, slopes: tuple[float, float]) -> Vector:
+    """The place nearest to the scene from which all balls lie between the four planes of the picture.
+
+    Exact: a ball at (x, z) lies under the plane of slope k through (c, d) when x - k z + r sqrt(1 + k^2) <= c - k d,
+    so the largest left sides of two opposite planes give c and d.
+    """
+    place = np.zeros(3)
+    depths = []
+    for axis, k in enumerate(slopes):
+        pad = radii * math.sqrt(1.0 + k * k)
+        above = float(np.max(seen[:, axis] - k * seen[:, 2] + pad))
+        below = float(np.max(-seen[:, axis] - k * seen[:, 2] + pad))
+        place[axis] = 0.5 * (above - below)
+        depths.append(-(above + below) / (2.0 * k))
+    place[2] = min(*depths, -1e-9)
+    return place
+
+
+def _distance(seen: Vector, radii: Vector, slopes: tuple[float, float]) -> float:
+    """How far to step back along the axis so that all balls are in the picture."""
+    need = [
+        float(np.max((np.abs(seen[:, axis]) + radii * math.sqrt(1.0 + k * k)) / k - seen[:, 2]))
+        for axis, k in enumerate(slopes)
+    ]
+    return max(*need, 1e-9)
+
+
+def _interesting(frames: Iterable[Frame]) -> Vector:
+    """Balls (x, y, z, radius) that the picture must show, shape (n, 4) with n >= 1."""
+    spots: list[Vector] = []
+    static: dict[str, Vector] = {}
+    for frame in frames:
+        for drawable in frame.drawables:
+            if isinstance(drawable, Triangles) and drawable.vertices is not None:
+                static[drawable.name] = _finite(drawable.vertices, 0.0)
+            else:
+                spots.append(_robust(_extent(drawable, frame), isinstance(drawable, Points)))
+        if not frame.drawables:
+            spots.append(_robust(_finite(frame.positions, 0.0), True))
+    meshes = np.concatenate([np.zeros((0, 4)), *static.values()])
+    found = np.concatenate([np.zeros((0, 4)), *spots])
+    if not len(found):
+        return meshes if len(meshes) else np.zeros((1, 4))
+    return np.concatenate([found, _near(meshes, found)])
+
+
+def _extent(drawable: Drawable, frame: Frame) -> Vector:
+    """Corners of a drawable that it names, as balls."""
+    if isinstance(drawable, Arrows):
+        tails = np.asarray(drawable.vertices, dtype=np.float64)
+        return _finite(np.concatenate([tails, tails + np.asarray(drawable.vectors)]), 0.0)
+    corners = frame.positions if drawable.vertices is None else drawable.vertices
+    if isinstance(drawable, Points):
+        index = np.arange(len(corners)) if drawable.index is None else np.asarray(drawable.index)
+        return _finite(corners[index], drawable.radius)
+    names: Any = {"segments": "pairs", "curves": "index", "triangles": "faces"}[drawable.kind]
+    return _finite(corners[np.unique(getattr(drawable, names))], 0.0)
+
+
+def _finite(positions: Floats, radius: Floats | float) -> Vector:
+    """Rows (x, y, z, radius) without those that are not finite."""
+    rows = np.empty((len(positions), 4))
+    rows[:, :3] = positions
+    rows[:, 3] = radius
+    return rows[np.isfinite(rows).all(axis=1)]
+
+
+def _robust(rows: Vector, percentiles: bool) -> Vector:
+    """Few balls that stand for many: those inside the percentiles, thinned to the outermost of each direction."""
+    if len(rows) <= 64:
+        return rows
+    if percentiles and len(rows) > MANY:
+        low, high = np.percentile(rows[:, :3], PERCENTILES, axis=0)
+        rows = rows[((rows[:, :3] >= low) & (rows[:, :3] <= high)).all(axis=1)]
+    if len(rows) <= MANY:
+        return rows
+    # The corners of the box hold every ball; a film has too many frames to keep all of them.
+    low, high = rows[:, :3].min(axis=0), rows[:, :3].max(axis=0)
+    corners = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1).reshape(-1, 3)
+    return np.concatenate([corners, np.full((8, 1), rows[:, 3].max())], axis=1)
+
+
+def _near(meshes: Vector, found: Vector) -> Vector:
+    """Corners of static meshes, pulled into a box a little larger than the particles'."""
+    if not len(meshes):
+        return meshes
+    low, high = (found[:, :3] - found[:, 3:]).min(axis=0), (found[:, :3] + found[:, 3:]).max(axis=0)
+    room = 0.1 * float(np.linalg.norm(high - low))
+    pulled = meshes.copy()
+    pulled[:, :3] = np.clip(meshes[:, :3], low - room, high + room)
+    return pulled
+
+
+def _triple(vector: Vector) -> tuple[float, float, float]:
+    return (float(vector[0]), float(vector[1]), float(vector[2]))

@@ -1,0 +1,86 @@
+"""The loops that draw the shadow map."""
+
+import math
+
+import numpy as np
+from numba import njit, prange
+
+BANDS = 32
+ZERO = np.float32(0.0)
+ONE = np.float32(1.0)
+HALF = np.float32(0.5)
+TINY = np.float32(1e-12)
+
+
+@njit(cache=True, error_model="numpy")
+def _clamp(value, low, high):
+    return min(max(value, low), high)
+
+
+@njit(cache=True, error_model="numpy")
+def _keep_nearest(depth, row, column, value):
+    if value < depth[row, column]:  # false for NaN
+        depth[row, column] = value
+
+
+@njit(cache=True, error_model="numpy")
+def _span(low, high, first, last):
+    """Whole texels between low and high, inside [first, last)."""
+    a = np.int64(_clamp(math.floor(low), np.float32(first), np.float32(last)))
+    b = np.int64(_clamp(math.ceil(high), np.float32(first), np.float32(last)))
+    return a, b
+
+
+@njit(cache=True, error_model="numpy")
+def _cast_face(depth, r0, r1, c):
+    ax, ay, bx, by, cx, cy = c[0], c[1], c[3], c[4], c[6], c[7]
+    area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    if abs(area) < TINY:
+        return
+    inverse = ONE / area
+    y0, y1 = _span(min(ay, by, cy), max(ay, by, cy), r0, r1)
+    x0, x1 = _span(min(ax, bx, cx), max(ax, bx, cx), 0, depth.shape[1])
+    for row in range(y0, y1):
+        y = np.float32(row) + HALF
+        for column in range(x0, x1):
+            x = np.float32(column) + HALF
+            v = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) * inverse
+            w = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) * inverse
+            if v >= ZERO and w >= ZERO and v + w <= ONE:
+                _keep_nearest(depth, row, column, c[2] + v * (c[5] - c[2]) + w * (c[8] - c[2]))
+
+
+@njit(cache=True, error_model="numpy")
+def _cast_capsule(depth, r0, r1, ax, ay, az, ra, bx, by, bz, rb):
+    """A capsule seen across; a ball is one without length."""
+    dx, dy = bx - ax, by - ay
+    square = max(dx * dx + dy * dy, TINY)
+    y0, y1 = _span(min(ay - ra, by - rb), max(ay + ra, by + rb), r0, r1)
+    x0, x1 = _span(min(ax - ra, bx - rb), max(ax + ra, bx + rb), 0, depth.shape[1])
+    for row in range(y0, y1):
+        y = np.float32(row) + HALF
+        for column in range(x0, x1):
+            x = np.float32(column) + HALF
+            t = _clamp(((x - ax) * dx + (y - ay) * dy) / square, ZERO, ONE)
+            radius = ra + t * (rb - ra)
+            ex, ey = x - ax - t * dx, y - ay - t * dy
+            rest = radius * radius - ex * ex - ey * ey
+            if rest > ZERO:
+                _keep_nearest(depth, row, column, az + t * (bz - az) - math.sqrt(rest))
+
+
+@njit(parallel=True, cache=True, error_model="numpy")
+def cast(depth, faces, balls, capsules):
+    """Write the distance to the nearest caster into `depth`; all in texels."""
+    rows = depth.shape[0]
+    for band in prange(BANDS):
+        r0, r1 = band * rows // BANDS, (band + 1) * rows // BANDS
+        depth[r0:r1] = np.float32(np.inf)
+        for i in range(faces.shape[0]):
+            _cast_face(depth, r0, r1, faces[i])
+        for i in range(balls.shape[0]):
+            b = balls[i]
+            _cast_capsule(depth, r0, r1, b[0], b[1], b[2], b[3], b[0], b[1], b[2], b[3])
+        for i in range(capsules.shape[0]):
+            c = capsules[i]
+            _cast_capsule(depth, r0, r1, c[0], c[1], c[2], c[6], c[3], c[4], c[5], c[7])

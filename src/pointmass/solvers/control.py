@@ -1,0 +1,133 @@
+"""How long the next step of each island may be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from pointmass.errors import Diverged
+from pointmass.solvers.base import Array, Memory, Solver, Step, System
+from pointmass.solvers.islands import Islands, Mask, number_of, rms
+
+CLOCK_ULPS = 16.0  # a step this many roundings of its clock long no longer moves it reliably
+
+
+@final
+@dataclass(frozen=True)
+class PIController:
+    """Proportional and integral control of the step, for each island on its own.
+
+    Attributes
+    ----------
+    rtol, atol : tolerated local error, relative and absolute (in the units of y).
+    order : of the method; the error of a step falls as h^order.
+    beta : weight of the previous error.
+    safety, shrink, grow : factor on the step, and its limits.
+    floor : the previous error counts at least this much.
+
+    Notes
+    -----
+    Gustafsson, ACM Trans. Math. Softw. 17 (1991), 533; the constants are those of DOPRI5 in Hairer, Norsett and
+    Wanner, Solving Ordinary Differential Equations I, sec. II.4 and IV.2. The memory has, for each island: `h_next`
+    [s] (0: not chosen yet), `error_old` and `rejected`.
+    """
+
+    rtol: float
+    atol: float
+    order: int
+    beta: float = 0.04
+    safety: float = 0.9
+    shrink: float = 0.2
+    grow: float = 10.0
+    floor: float = 1e-4
+
+    def start(self, n: int) -> Memory:
+        """Memory for n islands that have not moved yet."""
+        return {"h_next": np.zeros(n), "error_old": np.full(n, self.floor), "rejected": np.zeros(n, np.bool_)}
+
+    def norm(self, error: Array, y0: Array, y1: Array, islands: Islands) -> Array:
+        """Error over tolerance, root mean square of each island; NaN and infinity stay."""
+        return rms(error / self._scale(np.maximum(np.abs(y0), np.abs(y1))), islands, number_of(islands))
+
+    def judge(self, step: Step, h: Array, wanted: Array, islands: Islands, memory: Memory) -> tuple[Mask, Memory]:
+        """Which islands keep the step, and their memory for the next.
+
+        Parameters
+        ----------
+        step : the trial, with its error.
+        h : length of the trial of each island [s]; 0 where none was made, and nothing changes there.
+        wanted : length that was asked for, longer than h where the end of the run cut it.
+        islands : of each entry of y, shape (dim,).
+        memory : as at the start of the trial.
+        """
+        assert step.error is not None
+        error = self.norm(step.error, step.y0, step.y1, islands)
+        tried, accepted = h > 0.0, error <= 1.0  # NaN is not accepted
+        longer = h * self._factor(error, memory["error_old"])
+        longer = np.where(memory["rejected"], np.minimum(longer, h), longer)
+        longer = np.where(h < wanted, np.maximum(longer, wanted), longer)
+        new = {
+            "h_next": np.where(accepted, longer, h * self._retreat(error)),
+            "error_old": np.where(accepted, np.maximum(error, self.floor), memory["error_old"]),
+            "rejected": ~accepted,
+        }
+        kept = {key: np.where(tried, value, memory[key]) for key, value in new.items()}
+        return accepted & tried, {**memory, **kept}
+
+    def check(self, rejected: Mask, h_next: Array, clock: Array, end: float) -> None:
+        """Raise `Diverged` if an island was rejected down to steps that its clock cannot resolve."""
+        least = CLOCK_ULPS * np.finfo(np.float64).eps * np.maximum(np.abs(clock), abs(end))
+        stuck = np.flatnonzero(rejected & (h_next < least))
+        if len(stuck):
+            i = int(stuck[0])
+            raise Diverged(
+                f"no step at t = {clock[i]:.6g} s is short enough for rtol = {self.rtol:g} and atol = {self.atol:g}"
+                f" (island {i}): the forces have a jump or a singularity there, or the tolerances are too small",
+                time=float(clock[i]),
+            )
+
+    def first_step(self, system: System, t: Array, y: Array) -> Array:
+        """A step to begin with for each island [s], from the size of y, y' and y''.
+
+        Hairer, Norsett and Wanner, sec. II.4: an explicit Euler step of a hundredth of y / y' shows the second
+        derivative, and a step whose terms of that order are a hundredth of the tolerance is proposed.
+        """
+        islands = system.islands
+        n, scale = number_of(islands), self._scale(np.abs(y))
+        slope = system.deriv_eval(_common(t, islands), y)
+        d0, d1 = rms(y / scale, islands, n), rms(slope / scale, islands, n)
+        short = np.where((d0 < 1e-5) | ~(d1 >= 1e-5), 1e-6, 0.01 * d0 / np.maximum(d1, 1e-5))
+        there = system.deriv_eval(_common(t + short, islands), y + short[islands] * slope)
+        d2 = rms((there - slope) / scale, islands, n) / short
+        bend = np.maximum(d1, d2)
+        flat = np.maximum(1e-6, short * 1e-3)
+        h = np.where(bend > 1e-15, (0.01 / np.maximum(bend, 1e-15)) ** (1.0 / self.order), flat)
+        result: Array = np.where(np.isfinite(h), np.minimum(100.0 * short, h), short)
+        return result
+
+    def _scale(self, size: Array) -> Array:
+        result: Array = np.maximum(self.atol + self.rtol * size, np.finfo(np.float64).tiny)
+        return result
+
+    def _factor(self, error: Array, before: Array) -> Array:
+        slow = error ** (1.0 / self.order - 0.75 * self.beta) / before**self.beta / self.safety
+        result: Array = 1.0 / np.clip(slow, 1.0 / self.grow, 1.0 / self.shrink)
+        return result
+
+    def _retreat(self, error: Array) -> Array:
+        slow = error ** (1.0 / self.order - 0.75 * self.beta) / self.safety
+        result: Array = np.where(np.isfinite(slow), np.maximum(self.shrink, 1.0 / slow), self.shrink)
+        return result
+
+
+def control_of(solver: Solver) -> PIController | None:
+    """What sets the steps of a solver; None if it takes them as they are given."""
+    control: PIController | None = getattr(solver, "control", None)
+    return control
+
+
+def _common(values: Array, islands: Islands) -> float | Array:
+    """One number if all islands agree, else one for each entry of y: systems with one clock need not know arrays."""
+    return float(values[0]) if (values == values[0]).all() else values[islands]

@@ -1,0 +1,285 @@
+"""The particle system: particles, forces, colliders, and the four verbs by which a solver knows them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.collisions.collider import Collider
+from pointmass.errors import InvalidInput
+from pointmass.laws.elements import ConstraintForce
+from pointmass.laws.force import Blocks, Force
+from pointmass.particles import Array, Particles, Selection
+
+
+class Filter(Protocol):
+    """What stands between calculate and gather: resting contact takes away the load that a surface bears."""
+
+    def forces(self, t: Any, x: Array, v: Array, m: Array, f: Array) -> None:
+        """Change the accumulators `f` in place."""
+
+    def projection(self, n: int) -> Any:
+        """Directions in which contacts leave particles free: a scipy.sparse array of shape (3n, 3n)."""
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energies of a system [J]. `potential` leaves out forces that have none, which `without` names."""
+
+    kinetic: float
+    potential: float
+    by_force: dict[str, float]
+    without: tuple[str, ...]
+
+    @property
+    def total(self) -> float:
+        """Kinetic plus potential [J]."""
+        return self.kinetic + self.potential
+
+
+class ParticleSystem:
+    """Point masses, the forces on them, and what they bounce off.
+
+    A solver sees `dim`, `get_state`, `set_state` and `deriv_eval`. The state is `y = [x.ravel(), v.ravel()]`, of length 6n (the
+    lecture's slide interleaves x1 v1 x2 v2 ...; the numbers are the same). A system whose forces are velocity
+    fields (`Flow`, `Vortex`) has order 1: x' = g(x, t), y = x.ravel(), of length 3n.
+
+    Parameters
+    ----------
+    particles : they belong to the system from now on.
+    forces : add into the accumulators in this order.
+    colliders : surfaces to bounce off.
+
+    Raises
+    ------
+    InvalidInput
+        Forces of order 1 and 2 together; a force that names particles, groups or attributes that are not there.
+
+    Examples
+    --------
+    >>> ball = pm.Particles([[0, 1, 0]])
+    >>> system = pm.ParticleSystem(ball, forces=[pm.Gravity()])
+    >>> scipy.integrate.solve_ivp(system.deriv_eval, (0, 1), system.get_state())
+    """
+
+    def __init__(self, particles: Particles, forces: Iterable[Force] = (), colliders: Iterable[Collider] = ()) -> None:
+        self.particles = particles
+        self.forces = list(forces)
+        self.colliders = list(colliders)
+        self.filter: Filter | None = None
+        self.t = 0.0
+        self._islands: tuple[Any, NDArray[np.intp]] | None = None
+        for force in self.forces:
+            if not isinstance(force, Force):
+                raise InvalidInput(f"forces must be forces, such as pm.Gravity(), not {force!r}")
+        for collider in self.colliders:
+            if not isinstance(collider, Collider):
+                raise InvalidInput(f"colliders must be colliders, such as pm.Plane(), not {collider!r}")
+        self.order = self._common_order()
+        for force in self.forces:
+            force.bind(particles)
+
+    # ---------------------------------------------------------------------------------------- the four verbs
+
+    @property
+    def dim(self) -> int:
+        """How many numbers the state has: 6n, or 3n for a flow."""
+        return 3 * self.order * len(self.particles)
+
+    def get_state(self) -> Array:
+        """Gather the particles' state into one vector, shape (dim,)."""
+        p = self.particles
+        return np.concatenate([p.x.ravel(), p.v.ravel()]) if self.order == 2 else p.x.ravel().copy()
+
+    def set_state(self, y: Array, t: float | None = None) -> None:
+        """Scatter a state vector back to the particles, and set the clock."""
+        self.particles.x[:], v = self.split(self._checked(y))
+        if self.order == 2:
+            self.particles.v[:] = np.where(self.particles.pinned[:, None], 0, v)
+        if t is not None:
+            self.t = float(t)
+
+    def deriv_eval(self, t: Any = None, y: Array | None = None) -> Array:
+        """dy/dt at time `t` and state `y` (by default the present ones), shape (dim,).
+
+        It is a pure function of (t, y): the particles stay as they are, only their accumulators f are used. `t` may be an array of
+        shape (dim,): islands with clocks of their own.
+        """
+        y = self.get_state() if y is None else self._checked(y)
+        t = self._particle_time(self.t if t is None else t)
+        x, v = self.split(y)
+        self.clear_forces()
+        self.calculate_forces(t, x, v)
+        return self.gather(v)
+
+    # ---------------------------------------------------------------------------------------- derivEval's three loops
+
+    def clear_forces(self) -> None:
+        """1. Loop over particles, zero the force accumulators."""
+        self.particles.f[:] = 0
+
+    def calculate_forces(self, t: Any, x: Array, v: Array) -> None:
+        """2. Sum all forces into the accumulators; a surface bears what rests on it."""
+        for force in self.forces:
+            if force.enabled:
+                force.add_forces(self.particles, t, x, v, self.particles.f)
+        if self.filter is not None:
+            self.filter.forces(t, x, v, self.particles.m, self.particles.f)
+
+    def gather(self, v: Array) -> Array:
+        """3. Loop over particles, copying v and f/m into the result. Pinned particles have v = 0 and 1/m = 0."""
+        p = self.particles
+        if self.order == 1:
+            return np.where(p.pinned[:, None], 0, p.f).ravel()
+        free = p.w[:, None] > 0
+        acceleration = np.where(free, p.f / p.m[:, None], 0)
+        return np.concatenate([np.where(free, v, 0).ravel(), acceleration.ravel()])
+
+    # ---------------------------------------------------------------------------------------- more that solvers may ask
+
+    def split(self, y: Array) -> tuple[Array, Array]:
+        """Positions and velocities of a state vector, each of shape (n, 3)."""
+        n = len(self.particles)
+        x = y[: 3 * n].reshape(n, 3)
+        return x, (y[3 * n :].reshape(n, 3) if self.order == 2 else np.zeros_like(x))
+
+    @property
+    def velocity_dependent(self) -> bool:
+        """Whether accelerations depend on velocities."""
+        return any(force.velocity_dependent for force in self.forces if force.enabled) or self.filter is not None
+
+    @property
+    def inertia(self) -> Array:
+        """Mass of each velocity component [kg], shape (3n,); infinite for pinned particles."""
+        p = self.particles
+        return np.repeat(np.where(p.pinned, np.inf, p.m), 3)
+
+    @property
+    def islands(self) -> NDArray[np.intp]:
+        """Island of each entry of the state, shape (dim,)."""
+        return np.tile(np.repeat(self.island_of_particle, 3), self.order)
+
+    @property
+    def island_of_particle(self) -> NDArray[np.intp]:
+        """Connected component of each particle in the graph of forces, shape (n,)."""
+        key = (self.particles.version, tuple((id(f), f.enabled, len(getattr(f, "ids", ()))) for f in self.forces))
+        if self._islands is None or self._islands[0] != key:
+            self._islands = (key, self._components())
+        return self._islands[1]
+
+    def jacobian(self, t: Any, y: Array) -> Any:
+        """d(deriv_eval)/dy as a scipy.sparse CSR array of shape (dim, dim), exact, from the traced laws."""
+        from scipy.sparse import block_array, csr_array, diags_array
+
+        p, n = self.particles, len(self.particles)
+        x, v = self.split(self._checked(y))
+        blocks = Blocks()
+        for force in self.forces:
+            if force.enabled:
+                force.add_jacobian(p, self._particle_time(t), x, v, blocks)
+        dx, dv = blocks.matrices(n)
+        free = np.repeat(np.where(p.pinned, 0.0, 1.0), 3)
+        if self.order == 1:
+            return csr_array(diags_array(free) @ dx)
+        if self.filter is not None:
+            project = self.filter.projection(n)
+            dx, dv = project @ dx @ project, project @ dv @ project
+        weight = diags_array(np.repeat(p.w, 3))
+        return csr_array(block_array([[None, diags_array(free)], [weight @ dx, weight @ dv]]))
+
+    # ---------------------------------------------------------------------------------------- what users ask
+
+    def energy(self) -> Energy:
+        """Kinetic and potential energy now [J]."""
+        p = self.particles
+        speed2 = np.einsum("ij,ij->i", p.v.astype(np.float64), p.v.astype(np.float64))
+        parts: dict[str, float] = {}
+        without = []
+        for force in self.forces:
+            value = force.energy(p, self.t, p.x, p.v) if force.enabled else 0.0
+            if value is None:
+                without.append(force.name)
+            else:
+                parts[force.name] = parts.get(force.name, 0.0) + value
+        kinetic = float(0.5 * np.sum(p.m[~p.pinned] * speed2[~p.pinned]))
+        return Energy(kinetic, sum(parts.values()), parts, tuple(without))
+
+    def momentum(self) -> Array:
+        """Total momentum [kg m/s], shape (3,)."""
+        return np.einsum("i,ij->j", self.particles.m, self.particles.v)
+
+    def angular_momentum(self) -> Array:
+        """Total angular momentum about the origin [kg m^2/s], shape (3,)."""
+        p = self.particles
+        return np.einsum("i,ij->j", p.m, np.cross(p.x, p.v))
+
+    def stretch(self) -> float:
+        """Largest relative change of a spring's length; 0 without springs."""
+        worst = 0.0
+        for force in self.forces:
+            if isinstance(force, ConstraintForce) and force.nodes == 2 and len(force.ids):
+                everything = np.arange(len(force.ids))
+                rest = np.broadcast_to(
+                    force.parameters["rest"].of(self.particles, self.t, everything)[0], everything.shape
+                )
+                length = force.values(self.particles, self.particles.x)
+                relative = np.abs(length - rest)[rest > 0] / rest[rest > 0]
+                worst = max(worst, float(relative.max(initial=0.0)))
+        return worst
+
+    def add(self, x: Any, v: Any = None, **columns: Any) -> NDArray[np.int64]:
+        """Add particles (see `Particles.add`); every force without a selection acts on them too. Returns their ids."""
+        ids = self.particles.add(x, v, **columns)
+        for force in self.forces:
+            force.grow(self.particles, len(ids))
+        return ids
+
+    def remove(self, which: Selection) -> None:
+        """Take particles away, and the springs that end at them."""
+        mask = np.ones(len(self.particles), bool)
+        mask[self.particles.select(which)] = False
+        for force in self.forces:
+            force.keep(self.particles, mask)
+        self.particles.keep(mask)
+
+    # ---------------------------------------------------------------------------------------- inside
+
+    def _common_order(self) -> int:
+        orders = {force.order for force in self.forces}
+        if len(orders) > 1:
+            flows = [f.name for f in self.forces if f.order == 1]
+            raise InvalidInput(
+                f"{', '.join(flows)} is a velocity field (x' = g) and cannot be added to forces (m x'' = f): "
+                "let particles be dragged along by it with Wind(velocity=...)"
+            )
+        return orders.pop() if orders else 2
+
+    def _checked(self, y: Array) -> Array:
+        y = np.asarray(y, self.particles.dtype)
+        if y.shape != (self.dim,):
+            raise InvalidInput(f"the state must have shape ({self.dim},), not {y.shape}")
+        return y
+
+    def _particle_time(self, t: Any) -> Any:
+        return t[: 3 * len(self.particles) : 3] if isinstance(t, np.ndarray) and t.ndim else float(t)
+
+    def _components(self) -> NDArray[np.intp]:
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        n = len(self.particles)
+        links = _stack([f.links(self.particles) for f in self.forces if f.enabled])
+        if not len(links):
+            return np.arange(n)
+        graph = coo_array((np.ones(len(links), np.int8), (links[:, 0], links[:, 1])), shape=(n, n))
+        _, label = connected_components(graph, directed=False)
+        _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
+        return np.argsort(np.argsort(first))[inverse]  # numbered by their first particle
+
+
+def _stack(parts: Sequence[NDArray[np.intp]]) -> NDArray[np.intp]:
+    return np.concatenate(parts) if parts else np.zeros((0, 2), np.intp)
