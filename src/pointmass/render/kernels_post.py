@@ -9,6 +9,7 @@ ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 HALF = np.float32(0.5)
 SHOULDER = np.float32(0.6)  # below this the tone map changes nothing
+BLINDING = np.float32(1e30)
 FADE = np.float32(0.35)  # how much a light that is too bright for its hue turns white
 
 
@@ -103,6 +104,8 @@ def develop(image, light, spill, strength, exposure, curve, pattern):
                 g += strength * _doubled(spill, row, column, 1)
                 b += strength * _doubled(spill, row, column, 2)
             r, g, b = exposure * r, exposure * g, exposure * b
+            if not r + g + b < BLINDING:  # true for NaN too, which has no place in a table
+                r, g, b = ONE, ONE, ONE
             top = max(r, g, b)
             if top > SHOULDER:
                 scale = (ONE - FADE) * _roll(top) / top

@@ -24,13 +24,15 @@ def triangles(drawable: Triangles, frame: Frame, view: View) -> Table:
     """The triangles that may be seen, cut at the near plane."""
     places = corners(drawable, frame)
     faces = np.asarray(drawable.faces).reshape(-1, 3)
-    color = colors(drawable.color, len(places), drawable.name)
     named(places, faces, drawable.name)
+    # Colours may end where the corners that faces name end: a cloth among other particles.
+    count = np.asarray(drawable.color).shape[0] if np.ndim(drawable.color) == 2 else len(places)
+    color = colors(drawable.color, count, drawable.name)
     seen = view.see(places)
     normals = face_normals(seen, faces)
     shaded = vertex_normals(normals, faces, len(seen))[faces] if drawable.smooth else unit(normals)[:, None, :]
     full = np.empty((len(faces), 3, CORNER))
-    full[:, :, 0:3], full[:, :, 3:6], full[:, :, 6:10] = seen[faces], shaded, color[faces]
+    full[:, :, 0:3], full[:, :, 3:6], full[:, :, 6:10] = seen[faces], shaded, named(color, faces, drawable.name)
     with np.errstate(invalid="ignore"):
         keep = np.isfinite(full.sum(axis=(1, 2))) & (full[:, :, 9] > 0.0).any(axis=1)
         keep &= (normals * normals).sum(axis=1) > 0.0

@@ -1,0 +1,219 @@
+"""One frame as a picture."""
+
+from __future__ import annotations
+
+import os
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.errors import InvalidInput
+from pointmass.frame import Arrows, Camera, Curves, Drawable, Frame, Points, Segments
+from pointmass.render.balls import EMPTY as NO_BALLS
+from pointmass.render.balls import balls
+from pointmass.render.camera import View, fit_camera, look
+from pointmass.render.capsules import EMPTY as NO_CAPSULES
+from pointmass.render.capsules import arrows, curves, segments
+from pointmass.render.lamp import key_direction, lamp
+from pointmass.render.meshes import EMPTY as NO_FACES
+from pointmass.render.meshes import triangles
+from pointmass.render.shadow import Casters, casters, no_shadow, shadow
+from pointmass.render.style import Style
+from pointmass.render.tables import F32, Mask, Table, join, visible
+
+Image = NDArray[np.uint8]
+Ints = NDArray[np.int64]
+
+LARGEST = 8192  # pixels along a side
+SPREAD = 0.62  # how much weaker the bloom's wider blurs are
+
+# Numba's OpenMP threads spin while they wait, which starves a machine that several people share.
+os.environ.setdefault("GOMP_SPINCOUNT", "1000")
+
+
+def image(
+    frame: Frame,
+    *,
+    camera: Camera | None = None,
+    size: tuple[int, int] = (1280, 720),
+    style: Style | None = None,
+) -> Image:
+    """The picture of a frame.
+
+    The same frame gives the same bytes on any number of threads.
+
+    Parameters
+    ----------
+    frame : what there is to see. Items whose numbers are not finite are left out.
+    camera : from where; what it leaves open is chosen to show this frame.
+    size : width and height [pixels].
+    style : the look.
+
+    Returns
+    -------
+    array : sRGB bytes, shape (height, width, 3).
+
+    Raises
+    ------
+    InvalidInput : the size is out of range, or a drawable names corners that are not there.
+    """
+    size = checked_size(size)
+    style = style or Style()
+    camera = fit_camera([frame], camera, size)
+    light, spill = _light(frame, camera, look(camera, size), style)
+    picture = _develop(light, spill, style)
+    if style.caption:
+        from pointmass.render.caption import caption
+
+        picture = caption(picture, frame)
+    return picture
+
+
+def checked_size(size: tuple[int, int]) -> tuple[int, int]:
+    """Width and height as whole numbers from 1 to 8192, or `InvalidInput`."""
+    sides = tuple(size)
+    whole = len(sides) == 2 and all(isinstance(s, (int, np.integer)) and not isinstance(s, bool) for s in sides)
+    if not whole or not all(1 <= s <= LARGEST for s in sides):
+        raise InvalidInput(f"size = {size} is not allowed: it must be two whole numbers from 1 to {LARGEST}")
+    return int(sides[0]), int(sides[1])
+
+
+def _light(frame: Frame, camera: Camera, view: View, style: Style) -> tuple[F32, F32]:
+    """Linear light of the picture, and what spills around bright things at half the size."""
+    tables = _Tables()
+    for drawable in frame.drawables:
+        tables.add(drawable, frame, view, style.shadows)
+    faces, round_ones, lines = tables.joined()
+    map_ = shadow(tables.casters, key_direction(style, view)) if tables.casters else no_shadow()
+    from pointmass.render import kernels
+
+    height, width = view.height, view.width
+    bands = -(-height // kernels.BAND)
+    order_solid, order_soft = _orders((faces, round_ones, lines))
+    rows = np.concatenate((faces.box, round_ones.box, lines.box))[:, 2:]
+    lists: list[Ints] = []
+    for order in (order_solid, order_soft):
+        starts, places = kernels.sort_into_bands(rows[order], bands)
+        lists += [starts, order[places]]
+    light = np.empty((height, width, 3), dtype=np.float32)
+    bright = np.empty(((height + 1) // 2, (width + 1) // 2, 3), dtype=np.float32)
+    kernels.draw(
+        light,
+        bright,
+        _gradient(style, height),
+        np.array((view.focal, 0.5 * width, 0.5 * height), dtype=np.float32),
+        _offsets(style.samples),
+        bool((~faces.solid).any()),
+        _turns(bands),
+        *lists,
+        *(part for table in (faces, round_ones, lines) for part in (table.rows, table.box)),
+        lamp(style, view, camera.up, map_),
+        map_.depth,
+        map_.matrix,
+    )
+    return light, bright
+
+
+class _Tables:
+    """The rows of all drawables of a frame, and what of them throws shadows."""
+
+    def __init__(self) -> None:
+        self.faces: list[Table] = []
+        self.balls: list[Table] = []
+        self.lines: list[Table] = []
+        self.casters: list[Casters] = []
+
+    def add(self, drawable: Drawable, frame: Frame, view: View, shadows: bool) -> None:
+        """Rows of one drawable; what lies outside the picture is kept only for its shadow."""
+        faces, round_ones, lines = NO_FACES, NO_BALLS, NO_CAPSULES
+        if isinstance(drawable, Points):
+            round_ones = balls(drawable, frame, view)
+        elif isinstance(drawable, Segments):
+            lines = segments(drawable, frame, view)
+        elif isinstance(drawable, Curves):
+            lines = curves(drawable, frame, view)
+        elif isinstance(drawable, Arrows):
+            lines = arrows(drawable, view)
+        else:
+            faces = triangles(drawable, frame, view)
+        if shadows:
+            found = casters(faces, round_ones, lines, view, drawable.vertices is not None)
+            if len(found.spots()):
+                self.casters.append(found)
+        for parts, table in ((self.faces, faces), (self.balls, round_ones), (self.lines, lines)):
+            if len(table.rows):
+                parts.append(table.take(visible(table.box)))
+
+    def joined(self) -> tuple[Table, Table, Table]:
+        """Faces, balls and lines, each in the order of the drawables."""
+        return join(self.faces, NO_FACES), join(self.balls, NO_BALLS), join(self.lines, NO_CAPSULES)
+
+
+def _orders(tables: tuple[Table, ...]) -> tuple[Ints, Ints]:
+    """Numbers of the solid things, near ones first, and of the soft ones, far ones first."""
+    depth = np.concatenate([t.depth for t in tables])
+    solid: Mask = np.concatenate([t.solid for t in tables])
+    adds: Mask = np.concatenate([t.adds for t in tables])
+    front, soft = np.flatnonzero(solid), np.flatnonzero(~solid)
+    front = front[np.argsort(depth[front], kind="stable")]
+    if not adds[soft].all():  # sums of light need no order
+        soft = soft[np.argsort(-depth[soft], kind="stable")]
+    return front.astype(np.int64), soft.astype(np.int64)
+
+
+def _develop(light: F32, spill: F32, style: Style) -> Image:
+    """Bloom, tone map, sRGB."""
+    from pointmass.render import kernels_post
+
+    levels = max(1, round(np.log2(max(light.shape[0], 2) / 24.0)))
+    if style.bloom > 0.0:
+        kernels_post.bloom(spill, levels, np.float32(SPREAD))
+    picture = np.empty(light.shape, dtype=np.uint8)
+    kernels_post.develop(
+        picture, light, spill, np.float32(style.bloom), np.float32(style.exposure), _srgb_curve(), _dither()
+    )
+    return picture
+
+
+def _gradient(style: Style, height: int) -> F32:
+    """The background: from the top colour in the first row to the bottom colour in the last."""
+    share = ((np.arange(height) + 0.5) / height)[:, None]
+    # Eased, so that neither end shows an edge.
+    share = share * share * (3.0 - 2.0 * share)
+    return ((1.0 - share) * np.asarray(style.top) + share * np.asarray(style.bottom)).astype(np.float32)
+
+
+@lru_cache(maxsize=4)
+def _offsets(samples: int) -> F32:
+    """Places of the samples in a pixel: no two share a row or a column, so slanted edges come out smooth."""
+    i, j = np.meshgrid(np.arange(samples), np.arange(samples), indexing="ij")
+    x = (i + (j + 0.5) / samples) / samples
+    y = (j + (samples - i - 0.5) / samples) / samples
+    return np.stack((x.ravel(), y.ravel()), axis=1).astype(np.float32)
+
+
+def _turns(bands: int) -> Ints:
+    """All bands, each far from the one before it: thread counts do not change what is drawn, only who draws it."""
+    step = max(1, round(0.618 * bands))
+    while np.gcd(step, bands) != 1:
+        step += 1
+    return (np.arange(bands, dtype=np.int64) * step) % bands
+
+
+@lru_cache(maxsize=1)
+def _srgb_curve() -> F32:
+    """sRGB bytes (not rounded) of linear light, at equal steps of its square root."""
+    light = np.linspace(0.0, 1.0, 4096) ** 2
+    curve: Any = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1.0 / 2.4) - 0.055)
+    return (255.0 * curve).astype(np.float32)
+
+
+@lru_cache(maxsize=1)
+def _dither() -> F32:
+    """Bayer's 8 x 8 thresholds in (0, 1): added before the cut to bytes, they hide the steps of dark gradients."""
+    pattern = np.zeros((1, 1))
+    for _ in range(3):
+        pattern = np.block([[4 * pattern, 4 * pattern + 2], [4 * pattern + 3, 4 * pattern + 1]])
+    return ((pattern + 0.5) / 64.0).astype(np.float32)
