@@ -34,14 +34,12 @@ class BDF2(Implicit):
         return {"y_before": np.zeros(system.dim), "h_before": np.full(system.dim, np.inf)}
 
     def _stage(self, y: Array, h: Array, memory: Memory) -> tuple[Array, Array]:
-        memory = memory or {"y_before": y, "h_before": np.full(len(y), np.inf)}
         ratio = h / memory["h_before"]
         w = np.where(ratio > LARGEST_RATIO, 0.0, ratio)
         z = y + w * w / (1.0 + 2.0 * w) * (y - memory["y_before"])
         return z, h * (1.0 + w) / (1.0 + 2.0 * w)
 
     def _remember(self, y: Array, h: Array, memory: Memory) -> Memory:
-        memory = memory or {"y_before": y, "h_before": np.full(len(y), np.inf)}
         still = h == 0.0
         return {
             **memory,

@@ -52,7 +52,7 @@ class PIController:
         return rms(error / self._scale(np.maximum(np.abs(y0), np.abs(y1))), islands, number_of(islands))
 
     def judge(self, step: Step, h: Array, wanted: Array, islands: Islands, memory: Memory) -> tuple[Mask, Memory]:
-        """Which islands keep the step, and their memory for the next.
+        """Which islands keep the step, and what the control remembers of it.
 
         Parameters
         ----------
@@ -73,8 +73,7 @@ class PIController:
             "error_old": np.where(accepted, np.maximum(error, self.floor), memory["error_old"]),
             "rejected": ~accepted,
         }
-        kept = {key: np.where(tried, value, memory[key]) for key, value in new.items()}
-        return accepted & tried, {**memory, **kept}
+        return accepted & tried, {key: np.where(tried, value, memory[key]) for key, value in new.items()}
 
     def check(self, rejected: Mask, h_next: Array, clock: Array, end: float) -> None:
         """Raise `Diverged` if an island was rejected down to steps that its clock cannot resolve."""

@@ -57,6 +57,7 @@ class Implicit(Solver):
 
     def step(self, system: System, t: Clock, y: Array, h: Clock, memory: Memory) -> Step:
         """The state at t + h."""
+        memory = memory or self.start(system)
         length = np.broadcast_to(np.asarray(h, y.dtype), y.shape)
         z, gamma = self._stage(y, length, memory)
         stage, iterations = self._newton.solve(system, t + self.c * h, z, gamma, y)

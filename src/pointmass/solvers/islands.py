@@ -24,7 +24,7 @@ def number_of(islands: Islands) -> int:
 
 def total(values: Array, islands: Islands, n: int) -> Array:
     """Sum over each of the n islands, shape (n,)."""
-    result: Array = np.bincount(islands, weights=values, minlength=n)
+    result: Array = np.bincount(islands, weights=values, minlength=n).astype(np.float64, copy=False)
     return result
 
 

@@ -16,45 +16,59 @@ BLOCK = 3  # unknowns of one particle in space; any size is correct
 
 
 class LinearSolver(Protocol):
-    """Solves the velocity block of (1 - gamma J) delta = right."""
+    """Solves (1 - gamma J) delta = right."""
 
-    def __call__(self, matrix: Any, right: Array, movable: NDArray[np.bool_], system: System) -> Array:
-        """`matrix` and `right` are those of the velocities (order 2) or of all entries (order 1)."""
+    def __call__(self, jacobian: Any, gamma: Array, right: Array, system: System) -> Array:
+        """delta, shape (dim,).
+
+        Parameters
+        ----------
+        jacobian : of deriv_eval, scipy.sparse, shape (dim, dim).
+        gamma : of each entry of y [s], shape (dim,).
+        right : shape (dim,).
+        system : that the Jacobian belongs to.
+        """
 
 
-def solve_newton(jacobian: Any, gamma: Array, right: Array, system: System, linear: LinearSolver) -> Array:
-    """delta with (1 - gamma J) delta = right.
+def direct(jacobian: Any, gamma: Array, right: Array, system: System) -> Array:
+    """By LU factors, dense for small systems and sparse for large ones."""
+    from scipy import sparse
 
-    For order 2, with J = [[0, P], [A, B]], only (1 - gamma B - gamma A gamma P) dv = rv + gamma A rx is solved, and
-    dx = rx + gamma P dv follows (Baraff and Witkin, SIGGRAPH 1998, eq. 6). P is 0 for pinned entries, else 1.
+    if len(right) <= SMALL:
+        return _factored(np.eye(len(right)) - gamma[:, None] * jacobian.toarray(), right)
+    if system.order == 1:
+        return _factored(sparse.eye_array(len(right)) - sparse.diags_array(gamma) @ jacobian, right)
+    matrix, load = velocity_block(jacobian, gamma, right)
+    return with_positions(jacobian, gamma, right, _factored(matrix, load))
 
-    Parameters
-    ----------
-    jacobian : of deriv_eval, scipy.sparse, shape (dim, dim).
-    gamma : of each entry of y [s], shape (dim,).
-    right : shape (dim,).
+
+def velocity_block(jacobian: Any, gamma: Array, right: Array) -> tuple[Any, Array]:
+    """What is left for dv of an order 2 system, J = [[0, P], [A, B]]: matrix (n, n) and right side (n,).
+
+    (1 - gamma B - gamma A gamma P) dv = rv + gamma A rx, then dx = rx + gamma P dv (Baraff and Witkin, SIGGRAPH 1998,
+    eq. 6). P is 0 for pinned entries, else 1.
     """
     from scipy import sparse
 
-    if system.order == 1:
-        matrix = sparse.eye_array(len(right)) - sparse.diags_array(gamma) @ jacobian
-        return direct(matrix, right, np.ones(len(right), np.bool_), system)
     n = len(right) // 2
+    lift, push = sparse.diags_array(gamma[:n]), sparse.diags_array(gamma[n:])
     moves, pull, damp = jacobian[:n, n:], jacobian[n:, :n], jacobian[n:, n:]
-    lift = sparse.diags_array(gamma[:n])
-    push = sparse.diags_array(gamma[n:])
     matrix = sparse.eye_array(n) - push @ damp - push @ pull @ lift @ moves
-    dv = linear(matrix, right[n:] + gamma[n:] * (pull @ right[:n]), moves.diagonal() != 0.0, system)
-    return np.concatenate([right[:n] + gamma[:n] * (moves @ dv), dv])
+    return matrix, right[n:] + gamma[n:] * (pull @ right[:n])
 
 
-def direct(matrix: Any, right: Array, movable: NDArray[np.bool_], system: System) -> Array:
-    """By LU factors, sparse for large systems."""
+def with_positions(jacobian: Any, gamma: Array, right: Array, dv: Array) -> Array:
+    """[dx, dv] from dv."""
+    n = len(dv)
+    return np.concatenate([right[:n] + gamma[:n] * (jacobian[:n, n:] @ dv), dv])
+
+
+def _factored(matrix: Any, right: Array) -> Array:
     from scipy.sparse.linalg import splu
 
     try:
-        if len(right) <= SMALL:
-            return np.linalg.solve(matrix.toarray(), right)
+        if isinstance(matrix, np.ndarray):
+            return np.linalg.solve(matrix, right)
         result: Array = splu(matrix.tocsc()).solve(right)
     except (np.linalg.LinAlgError, RuntimeError):
         raise Diverged("the equations of an implicit step are singular: use a smaller dt") from None
@@ -82,18 +96,20 @@ class ConjugateGradients:
     def __init__(self, tolerance: float) -> None:
         self.tolerance = tolerance
 
-    def __call__(self, matrix: Any, right: Array, movable: NDArray[np.bool_], system: System) -> Array:
-        """The solution of the symmetric part, shape (n,)."""
+    def __call__(self, jacobian: Any, gamma: Array, right: Array, system: System) -> Array:
+        """delta of the symmetric part, shape (dim,); order 1 has no symmetry to use and is solved directly."""
         from scipy import sparse
 
-        free = movable & np.isfinite(system.inertia) & (system.inertia > 0.0)
-        mass = np.where(free, system.inertia, 0.0)
-        fixed = np.where(free, 0.0, right)
-        kept = sparse.diags_array(free.astype(np.float64))
-        stiff = sparse.csr_array(kept @ sparse.diags_array(mass) @ matrix @ kept)
+        if system.order == 1:
+            return direct(jacobian, gamma, right, system)
+        n = len(right) // 2
+        matrix, load = velocity_block(jacobian, gamma, right)
+        free = np.isfinite(system.inertia) & (system.inertia > 0.0) & (jacobian[:n, n:].diagonal() != 0.0)
+        mass, fixed = np.where(free, system.inertia, 0.0), np.where(free, 0.0, load)
+        stiff = sparse.diags_array(mass) @ matrix @ sparse.diags_array(free.astype(np.float64))
         symmetric = sparse.csr_array(0.5 * (stiff + stiff.T))
-        load = mass * (right - matrix @ fixed)
-        return fixed + self._iterate(symmetric, load, free, system.islands[len(right) :])
+        dv = fixed + self._iterate(symmetric, mass * (load - matrix @ fixed), free, system.islands[n:])
+        return with_positions(jacobian, gamma, right, dv)
 
     def _iterate(self, matrix: Any, load: Array, free: NDArray[np.bool_], islands: Islands) -> Array:
         n = number_of(islands)

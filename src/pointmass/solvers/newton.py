@@ -10,7 +10,7 @@ import numpy as np
 from pointmass.errors import Diverged
 from pointmass.solvers.base import Array, Clock, System
 from pointmass.solvers.islands import Islands, Mask, largest, moved, number_of
-from pointmass.solvers.linear import LinearSolver, solve_newton
+from pointmass.solvers.linear import LinearSolver
 
 ROUNDINGS = 32.0  # of the largest product in J y; a residual this small is round-off
 HALVINGS = 20
@@ -51,30 +51,33 @@ class Newton:
         """
         stage = _Stage(system, t, z, gamma)
         y, r = guess, stage.residual(guess)
-        active = largest(r, stage.islands, stage.n) != 0.0
+        active = stage.unsolved(r)
         for iteration in range(self.max_iterations):
             if not active.any():
                 return y, iteration
             jacobian = system.jacobian(t, y)
             right = np.where(active[stage.islands], -r, 0.0)
-            delta = solve_newton(jacobian, gamma, right, system, self.linear)
+            still = gamma * (abs(jacobian) @ np.ones(len(y))) == 0.0  # pinned, or h is 0: not even round-off
+            delta = np.where(still, right, self.linear(jacobian, gamma, right, system))
             if self.once:
                 return moved(delta, y, y + delta), 1
             allowed = stage.allowed(jacobian, y, r, self.tolerance)
-            y, r = self._search(stage, y, delta, stage.excess(r, allowed), allowed)
+            y, r = self._search(stage, y, delta, active, stage.excess(r, allowed), allowed)
             active &= ~(stage.excess(r, allowed) <= 1.0)
         if active.any():
             raise stage.failure(int(np.flatnonzero(active)[0]), self.max_iterations)
         return y, self.max_iterations
 
-    def _search(self, stage: _Stage, y: Array, delta: Array, excess: Array, allowed: Array) -> tuple[Array, Array]:
+    def _search(
+        self, stage: _Stage, y: Array, delta: Array, active: Mask, excess: Array, allowed: Array
+    ) -> tuple[Array, Array]:
         """The full step, or on islands where the residual grows the first of its halves that lowers it."""
         part = np.ones(stage.n)
         for _ in range(HALVINGS):
             trial = moved(delta, y, y + part[stage.islands] * delta)
             r = stage.residual(trial)
-            worse = ~(stage.excess(r, allowed) < np.maximum(excess, 1.0))
-            worse &= excess > 0.0
+            now = stage.excess(r, allowed)
+            worse = active & ~((now < excess) | (now <= 1.0))
             if not worse.any():
                 break
             part = np.where(worse, 0.5 * part, part)
@@ -96,6 +99,14 @@ class _Stage:
         """y - z - gamma F(t, y), shape (dim,)."""
         r: Array = y - self.z - self.gamma * self.system.deriv_eval(self.t, y)
         return r
+
+    def unsolved(self, r: Array) -> Mask:
+        """Islands with any residual at all; raises `Diverged` if one is not finite."""
+        size = largest(r, self.islands, self.n)
+        if not np.isfinite(size).all():
+            raise self.failure(int(np.flatnonzero(~np.isfinite(size))[0]), 0)
+        result: Mask = size != 0.0
+        return result
 
     def allowed(self, jacobian: Any, y: Array, r: Array, tolerance: float) -> Array:
         """The residual each group may have: a part of z and gamma F, or the round-off of F, whichever is larger."""
