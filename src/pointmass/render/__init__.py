@@ -1,7 +1,11 @@
-"""Pictures and films of frames, drawn by loops of our own: no window, no GPU, the same bytes on any number of threads."""
+"""Pictures and films of frames, drawn by loops of our own: no window, no GPU, the same bytes on any number of threads.
+
+Numba, PyAV and Pillow are loaded when the first picture or film is made.
+"""
 
 from pointmass.render.camera import fit_camera
+from pointmass.render.film import WRITERS, write
 from pointmass.render.image import image
 from pointmass.render.style import Style
 
-__all__ = ["Style", "fit_camera", "image"]
+__all__ = ["WRITERS", "Style", "fit_camera", "image", "write"]

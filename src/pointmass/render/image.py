@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from pointmass.errors import InvalidInput
 from pointmass.frame import Arrows, Camera, Curves, Drawable, Frame, Points, Segments
 from pointmass.render.balls import EMPTY as NO_BALLS
 from pointmass.render.balls import balls
+from pointmass.render.bands import each
 from pointmass.render.camera import View, fit_camera, look
 from pointmass.render.capsules import EMPTY as NO_CAPSULES
 from pointmass.render.capsules import arrows, curves, segments
@@ -27,10 +28,8 @@ Image = NDArray[np.uint8]
 Ints = NDArray[np.int64]
 
 LARGEST = 8192  # pixels along a side
+ROWS = 64  # rows that one thread develops at a time
 SPREAD = 0.62  # how much weaker the bloom's wider blurs are
-
-# Numba's OpenMP threads spin while they wait, which starves a machine that several people share.
-os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 
 
 def image(
@@ -91,28 +90,37 @@ def _light(frame: Frame, camera: Camera, view: View, style: Style) -> tuple[F32,
 
     height, width = view.height, view.width
     bands = -(-height // kernels.BAND)
-    order_solid, order_soft = _orders((faces, round_ones, lines))
-    rows = np.concatenate((faces.box, round_ones.box, lines.box))[:, 2:]
-    lists: list[Ints] = []
-    for order in (order_solid, order_soft):
-        starts, places = kernels.sort_into_bands(rows[order], bands)
-        lists += [starts, order[places]]
+    boxes = np.concatenate((faces.box, round_ones.box, lines.box))[:, 2:]
+    solids, softs = (
+        _lists(order, *kernels.sort_into_bands(boxes[order], bands)) for order in _orders((faces, round_ones, lines))
+    )
     light = np.empty((height, width, 3), dtype=np.float32)
     bright = np.empty(((height + 1) // 2, (width + 1) // 2, 3), dtype=np.float32)
-    kernels.draw(
-        light,
-        bright,
-        _gradient(style, height),
-        np.array((view.focal, 0.5 * width, 0.5 * height), dtype=np.float32),
-        _offsets(style.samples),
-        bool((~faces.solid).any()),
-        _turns(bands),
-        *lists,
-        *(part for table in (faces, round_ones, lines) for part in (table.rows, table.box)),
-        lamp(style, view, camera.up, map_),
-        map_.depth,
-        map_.matrix,
-    )
+    background = _gradient(style, height)
+    middle = np.array((view.focal, 0.5 * width, 0.5 * height), dtype=np.float32)
+    layered = bool((~faces.solid).any())
+    things = [part for table in (faces, round_ones, lines) for part in (table.rows, table.box)]
+    lamp_ = lamp(style, view, camera.up, map_)
+
+    def band(i: int) -> None:
+        top, bottom = i * kernels.BAND, min((i + 1) * kernels.BAND, height)
+        kernels.draw(
+            top,
+            light[top:bottom],
+            bright[top // 2 : (bottom + 1) // 2],
+            background[top:bottom],
+            middle,
+            _offsets(style.samples),
+            layered,
+            solids[i],
+            softs[i],
+            *things,
+            lamp_,
+            map_.depth,
+            map_.matrix,
+        )
+
+    each(band, bands)
     return light, bright
 
 
@@ -171,10 +179,20 @@ def _develop(light: F32, spill: F32, style: Style) -> Image:
     if style.bloom > 0.0:
         kernels_post.bloom(spill, levels, np.float32(SPREAD))
     picture = np.empty(light.shape, dtype=np.uint8)
-    kernels_post.develop(
-        picture, light, spill, np.float32(style.bloom), np.float32(style.exposure), _srgb_curve(), _dither()
-    )
+    numbers = (np.float32(style.bloom), np.float32(style.exposure), _srgb_curve(), _dither())
+
+    def rows(i: int) -> None:
+        last = min((i + 1) * ROWS, len(light))
+        kernels_post.develop(i * ROWS, last, picture, light, spill, *numbers)
+
+    each(rows, -(-len(light) // ROWS))
     return picture
+
+
+def _lists(order: Ints, starts: Ints, places: Ints) -> list[Ints]:
+    """For each band the numbers of its things."""
+    things = order[places]
+    return [things[a:b] for a, b in pairwise(starts)]
 
 
 def _gradient(style: Style, height: int) -> F32:
@@ -192,14 +210,6 @@ def _offsets(samples: int) -> F32:
     x = (i + (j + 0.5) / samples) / samples
     y = (j + (samples - i - 0.5) / samples) / samples
     return np.stack((x.ravel(), y.ravel()), axis=1).astype(np.float32)
-
-
-def _turns(bands: int) -> Ints:
-    """All bands, each far from the one before it: thread counts do not change what is drawn, only who draws it."""
-    step = max(1, round(0.618 * bands))
-    while np.gcd(step, bands) != 1:
-        step += 1
-    return (np.arange(bands, dtype=np.int64) * step) % bands
 
 
 @lru_cache(maxsize=1)

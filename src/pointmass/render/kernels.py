@@ -10,13 +10,14 @@ Depths are compared as w = 1/z, which is linear in the picture; 0 is infinitely 
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from pointmass.render.balls import HALO as _HALO
 from pointmass.render.balls import MIN_BALL as _MIN_BALL
 from pointmass.render.balls import MIN_GLOW as _MIN_GLOW
 from pointmass.render.capsules import GLOW_REACH as _REACH
 from pointmass.render.capsules import MIN_GLOW as _MIN_LINE
+from pointmass.render.inner import inner
 
 BAND = 16  # rows of a band; even, for the bloom works at half the size
 
@@ -40,24 +41,24 @@ KNEE = np.float32(1.0)  # light above this spills
 HOTTEST = np.float32(24.0)  # and no more than this, or one spark would fill the picture
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _clamp(value, low, high):
     return min(max(value, low), high)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _unit(x, y, z):
     scale = ONE / math.sqrt(max(x * x + y * y + z * z, TINY))
     return x * scale, y * scale, z * scale
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _ray(px, py, camera):
     """Direction (x, y) with z = 1 from the eye through a pixel coordinate."""
     return (px - camera[1]) / camera[0], (camera[2] - py) / camera[0]
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _lit(x, y, z, depth, matrix):
     """Share of the key light at a place, from 4 x 4 texels weighted like a box three texels wide."""
     texels = depth.shape[0]
@@ -81,7 +82,7 @@ def _lit(x, y, z, depth, matrix):
     return lit / np.float32(9.0)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _shade(x, y, z, nx, ny, nz, r, g, b, gloss, lamp, shadow, matrix):
     """Light that leaves a surface at (x, y, z) towards the eye: key, sky and ground, a soft highlight, a rim."""
     vx, vy, vz = _unit(-x, -y, -z)
@@ -109,31 +110,45 @@ def _shade(x, y, z, nx, ny, nz, r, g, b, gloss, lamp, shadow, matrix):
     )
 
 
-@njit(cache=True, error_model="numpy")
-def _seen(depth, row, column, layer, layers, w, sharp):
+@inner
+def _seen(cell, layer, layers, w, sharp):
     """Share of a layer's samples that lie behind w; it fades over the thickness that `sharp` stands for."""
-    samples = depth.shape[2]
-    first, last = layer * samples // layers, (layer + 1) * samples // layers
+    samples = cell.shape[0]
+    first, last = (0, samples) if layers == 1 else (layer, layer + 1)
     total = ZERO
     for k in range(first, last):
-        total += _clamp((w - depth[row, column, k]) * sharp + ONE, ZERO, ONE)
+        total += _clamp((w - cell[k]) * sharp + ONE, ZERO, ONE)
     return total / np.float32(last - first)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _lay(light, depth, solid, row, column, w, sharp, r, g, b, alpha):
     """Lay premultiplied light with an alpha (0: it only adds) over every layer of a pixel, where it is in front."""
-    layers = light.shape[2]
+    pixel, cell = light[row, column], depth[row, column]
+    layers = pixel.shape[0]
     for k in range(layers):
-        share = _seen(depth, row, column, k, layers, w, sharp) if solid else ONE
+        share = _seen(cell, k, layers, w, sharp) if solid else ONE
         if share > ZERO:
             keep = ONE - alpha * share
-            light[row, column, k, 0] = keep * light[row, column, k, 0] + share * r
-            light[row, column, k, 1] = keep * light[row, column, k, 1] + share * g
-            light[row, column, k, 2] = keep * light[row, column, k, 2] + share * b
+            sample = pixel[k]
+            sample[0] = keep * sample[0] + share * r
+            sample[1] = keep * sample[1] + share * g
+            sample[2] = keep * sample[2] + share * b
 
 
-@njit(cache=True, error_model="numpy")
+@inner
+def _write(pixel, mask, alpha, r, g, b):
+    """Lay a colour over the samples of a pixel that the mask names."""
+    keep = ONE - alpha
+    for k in range(pixel.shape[0]):
+        if mask & (1 << k):
+            sample = pixel[k]
+            sample[0] = keep * sample[0] + alpha * r
+            sample[1] = keep * sample[1] + alpha * g
+            sample[2] = keep * sample[2] + alpha * b
+
+
+@inner
 def _narrow(slope, rest, x0, x1):
     """Pixels of [x0, x1) where slope * x + rest may be >= 0."""
     if slope > 0.0:
@@ -145,7 +160,7 @@ def _narrow(slope, rest, x0, x1):
     return x0, x1
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _face(t, box, top, bottom, solid, light, depth, camera, offsets, lamp, shadow, matrix):
     """One triangle: each sample in front is replaced (solid) or laid over."""
     ax, ay = np.float64(t[0]), np.float64(t[1])
@@ -168,14 +183,15 @@ def _face(t, box, top, bottom, solid, light, depth, camera, offsets, lamp, shado
         for column in range(x0, x1):
             hits, sx, sy = 0, 0.0, 0.0
             mask = 0
+            cell = depth[row - top, column]
             for k in range(samples):
                 px, py = column + offsets[k, 0] - ax, row + offsets[k, 1] - ay
                 v, w = vx * px + vy * py, wx * px + wy * py
                 if v >= 0.0 and w >= 0.0 and v + w <= 1.0:
                     near = np.float32((1.0 - v - w) * t[6] + v * t[7] + w * t[8])
-                    if near > depth[row - top, column, k]:
+                    if near > cell[k]:
                         if solid:
-                            depth[row - top, column, k] = near
+                            cell[k] = near
                         mask |= 1 << k
                         hits += 1
                         sx += px
@@ -202,15 +218,10 @@ def _face(t, box, top, bottom, solid, light, depth, camera, offsets, lamp, shado
                 GLOSS_MESH, lamp, shadow, matrix,
             )  # fmt: skip
             alpha = ONE if solid else _clamp(u * t[21] + v * t[25] + w * t[29], ZERO, ONE)
-            for k in range(samples):
-                if mask & (1 << k):
-                    keep = ONE - alpha
-                    light[row - top, column, k, 0] = keep * light[row - top, column, k, 0] + alpha * r
-                    light[row - top, column, k, 1] = keep * light[row - top, column, k, 1] + alpha * g
-                    light[row - top, column, k, 2] = keep * light[row - top, column, k, 2] + alpha * b
+            _write(light[row - top, column], mask, alpha, r, g, b)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _closest(c, dx, dy):
     """Along a ray: where it is nearest to a ball's centre, the centre as seen from there, and the ray's square."""
     square = dx * dx + dy * dy + ONE
@@ -218,7 +229,7 @@ def _closest(c, dx, dy):
     return along, c[0] - along * dx, c[1] - along * dy, c[2] - along, square
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _ball_color(c, dx, dy, lamp, shadow, matrix):
     """Light of a ball along a ray; a ray that just misses sees the edge."""
     along, px, py, pz, square = _closest(c, dx, dy)
@@ -227,26 +238,28 @@ def _ball_color(c, dx, dy, lamp, shadow, matrix):
     z = along - half
     # A ball is darker at its edge, as if it stood among others.
     x, y, _ = _unit(dx, dy, ONE)
-    dark = ONE - FALLOFF * (ONE + nx * x + ny * y + nz / math.sqrt(square)) ** 2
+    turned = ONE + nx * x + ny * y + nz / math.sqrt(square)
+    dark = ONE - FALLOFF * turned * turned
     return _shade(
         dx * z, dy * z, z, nx, ny, nz, c[4] * dark, c[5] * dark, c[6] * dark, GLOSS_BALL, lamp, shadow, matrix
     )
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _ball_solid(c, box, top, bottom, light, depth, camera, offsets, lamp, shadow, matrix):
     for row in range(max(box[2], top), min(box[3], bottom)):
         for column in range(box[0], box[1]):
             hits, sx, sy = 0, ZERO, ZERO
             mask = 0
+            cell = depth[row - top, column]
             for k in range(offsets.shape[0]):
                 dx, dy = _ray(np.float32(column) + offsets[k, 0], np.float32(row) + offsets[k, 1], camera)
                 along, px, py, pz, square = _closest(c, dx, dy)
                 rest = c[3] * c[3] - px * px - py * py - pz * pz
                 if rest > ZERO:
                     near = ONE / (along - math.sqrt(rest / square))
-                    if near > depth[row - top, column, k]:
-                        depth[row - top, column, k] = near
+                    if near > cell[k]:
+                        cell[k] = near
                         mask |= 1 << k
                         hits += 1
                         sx += dx
@@ -255,21 +268,17 @@ def _ball_solid(c, box, top, bottom, light, depth, camera, offsets, lamp, shadow
                 continue
             share = ONE / np.float32(hits)
             r, g, b = _ball_color(c, sx * share, sy * share, lamp, shadow, matrix)
-            for k in range(offsets.shape[0]):
-                if mask & (1 << k):
-                    light[row - top, column, k, 0] = r
-                    light[row - top, column, k, 1] = g
-                    light[row - top, column, k, 2] = b
+            _write(light[row - top, column], mask, ONE, r, g, b)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _ball_soft(c, box, top, bottom, solid, light, depth, camera, lamp, shadow, matrix):
     """A ball that is small or lets light through: coverage from the distance to its edge."""
     w = ONE / c[2]
     scale = camera[0] * w
     radius = scale * c[3]
     shown = max(radius, MIN_BALL)
-    strength = c[7] * (radius / shown) ** 2
+    strength = c[7] * (radius / shown) * (radius / shown)
     sharp = c[2] * c[2] / c[3]
     for row in range(max(box[2], top), min(box[3], bottom)):
         for column in range(box[0], box[1]):
@@ -281,13 +290,13 @@ def _ball_soft(c, box, top, bottom, solid, light, depth, camera, lamp, shadow, m
                 _lay(light, depth, solid, row - top, column, w, sharp, alpha * r, alpha * g, alpha * b, alpha)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _ball_glow(c, box, top, bottom, solid, light, depth, camera):
     """Light that falls as (1 - d^2)^3, close to a Gaussian, but with an end."""
     w = ONE / c[2]
     full = HALO * camera[0] * w * c[3]
     reach = max(full, MIN_GLOW)
-    strength = c[7] * (full / reach) ** 2
+    strength = c[7] * (full / reach) * (full / reach)
     sharp = c[2] * c[2] / c[3]
     x, y = camera[1] + camera[0] * w * c[0], camera[2] - camera[0] * w * c[1]
     inverse = ONE / (reach * reach)
@@ -301,7 +310,7 @@ def _ball_glow(c, box, top, bottom, solid, light, depth, camera):
                 _lay(light, depth, solid, row - top, column, w, sharp, f * c[4], f * c[5], f * c[6], ZERO)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _across(c, ra, rb, px, py):
     """Where a pixel coordinate lies on a capsule: along it (0 to 1), off its axis, to the left; off is -1 outside.
 
@@ -320,7 +329,7 @@ def _across(c, ra, rb, px, py):
     return t, math.sqrt(ox * ox + oy * oy), (dy * ex - dx * ey) / math.sqrt(square)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _capsule_color(c, t, left, radius, z, px, py, camera, lamp, shadow, matrix):
     """Light of a round line: the normal turns from edge to edge; along the line all is linear in the picture."""
     tx, ty, tz = _unit(c[3] - c[0], c[4] - c[1], c[5] - c[2])
@@ -333,14 +342,14 @@ def _capsule_color(c, t, left, radius, z, px, py, camera, lamp, shadow, matrix):
     s = _clamp(left / max(radius, ONE), np.float32(-0.95), np.float32(0.95))
     front = math.sqrt(ONE - s * s)
     nx, ny, nz = _unit(s * lx + front * fx, s * ly + front * fy, s * lz + front * fz)
-    dark = ONE - FALLOFF * (ONE - front) ** 2
+    dark = ONE - FALLOFF * (ONE - front) * (ONE - front)
     r, g, b = c[12] + t * (c[16] - c[12]), c[13] + t * (c[17] - c[13]), c[14] + t * (c[18] - c[14])
     return _shade(
         dx * z, dy * z, z, nx, ny, nz, r * dark, g * dark, b * dark, GLOSS_LINE, lamp, shadow, matrix
     )
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _capsule_solid(c, box, top, bottom, light, depth, camera, offsets, lamp, shadow, matrix):
     wa, wb = ONE / c[2], ONE / c[5]
     ra, rb = camera[0] * c[6] * wa, camera[0] * c[7] * wb
@@ -349,6 +358,7 @@ def _capsule_solid(c, box, top, bottom, light, depth, camera, offsets, lamp, sha
         for column in range(x0, x1):
             hits, sx, sy = 0, ZERO, ZERO
             mask = 0
+            cell = depth[row - top, column]
             for k in range(offsets.shape[0]):
                 px, py = np.float32(column) + offsets[k, 0], np.float32(row) + offsets[k, 1]
                 t, off, _ = _across(c, ra, rb, px, py)
@@ -358,8 +368,8 @@ def _capsule_solid(c, box, top, bottom, light, depth, camera, offsets, lamp, sha
                     s = off / radius
                     # The surface bulges towards the eye by a part of the radius.
                     near = w / (ONE - math.sqrt(ONE - s * s) * min(radius / camera[0], HALF))
-                    if near > depth[row - top, column, k]:
-                        depth[row - top, column, k] = near
+                    if near > cell[k]:
+                        cell[k] = near
                         mask |= 1 << k
                         hits += 1
                         sx += px
@@ -372,14 +382,10 @@ def _capsule_solid(c, box, top, bottom, light, depth, camera, offsets, lamp, sha
             r, g, b = _capsule_color(
                 c, t, left, ra + t * (rb - ra), z, sx, sy, camera, lamp, shadow, matrix
             )
-            for k in range(offsets.shape[0]):
-                if mask & (1 << k):
-                    light[row - top, column, k, 0] = r
-                    light[row - top, column, k, 1] = g
-                    light[row - top, column, k, 2] = b
+            _write(light[row - top, column], mask, ONE, r, g, b)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _capsule_span(c, y, reach, box):
     """Pixels of a row that lie within `reach` of the capsule's axis."""
     dx, dy = c[10] - c[8], c[11] - c[9]
@@ -392,7 +398,7 @@ def _capsule_span(c, y, reach, box):
     return np.int64(math.floor(x0)), np.int64(math.ceil(x1))
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _capsule_soft(c, box, top, bottom, solid, light, depth, camera, lamp, shadow, matrix):
     """A thin, clear or glowing line; thinner than a pixel it fades instead."""
     glow = c[24] > ZERO
@@ -428,7 +434,7 @@ def _capsule_soft(c, box, top, bottom, solid, light, depth, camera, lamp, shadow
                     _lay(light, depth, solid, row - top, column, w, sharp, alpha * r, alpha * g, alpha * b, alpha)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _mean(layers, picture):
     """The mean of all layers, into (rows, columns, 3)."""
     count = layers.shape[2]
@@ -445,7 +451,15 @@ def _mean(layers, picture):
             picture[row, column, 2] = b * share
 
 
-@njit(cache=True, error_model="numpy")
+@inner
+def _copy(picture, layers):
+    for row in range(picture.shape[0]):
+        for column in range(picture.shape[1]):
+            for channel in range(3):
+                layers[row, column, 0, channel] = picture[row, column, channel]
+
+
+@inner
 def _spill(picture, bright):
     """What is brighter than the knee, at half the size."""
     height, width = picture.shape[0], picture.shape[1]
@@ -466,66 +480,13 @@ def _spill(picture, bright):
             bright[row, column, 2] = b
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _background(layers, colors):
     for row in range(layers.shape[0]):
-        for channel in range(3):
-            layers[row, :, :, channel] = colors[row, channel]
-
-
-@njit(cache=True, error_model="numpy")
-def _band(
-    top, bottom, picture, bright, background, camera, offsets, layered, solids, softs,
-    faces, face_box, balls, ball_box, capsules, capsule_box, lamp, shadow, matrix,
-):  # fmt: skip
-    """Draw the rows [top, bottom)."""
-    rows, width = picture.shape[0], picture.shape[1]
-    many = len(solids) > 0 or layered
-    light = np.empty((rows, width, offsets.shape[0] if many else 1, 3), dtype=np.float32)
-    depth = np.zeros((rows, width, light.shape[2]), dtype=np.float32)
-    _background(light, background)
-    capsule_first = len(faces) + len(balls)
-    for item in solids:
-        if item < len(faces):
-            _face(
-                faces[item], face_box[item], top, bottom, True, light, depth, camera, offsets, lamp, shadow, matrix
-            )
-        elif item < capsule_first:
-            i = item - len(faces)
-            _ball_solid(
-                balls[i], ball_box[i], top, bottom, light, depth, camera, offsets, lamp, shadow, matrix
-            )
-        else:
-            i = item - capsule_first
-            _capsule_solid(
-                capsules[i], capsule_box[i], top, bottom, light, depth, camera, offsets, lamp, shadow, matrix
-            )
-    if many and not layered:
-        # Nothing that follows needs the samples one by one.
-        _mean(light, picture)
-        light = np.empty((rows, width, 1, 3), dtype=np.float32)
-        light[:, :, 0, :] = picture
-    solid = len(solids) > 0
-    for item in softs:
-        if item < len(faces):
-            _face(
-                faces[item], face_box[item], top, bottom, False, light, depth, camera, offsets, lamp, shadow, matrix
-            )
-        elif item < capsule_first:
-            i = item - len(faces)
-            if balls[i, 8] > ZERO:
-                _ball_glow(balls[i], ball_box[i], top, bottom, solid, light, depth, camera)
-            else:
-                _ball_soft(
-                    balls[i], ball_box[i], top, bottom, solid, light, depth, camera, lamp, shadow, matrix
-                )
-        else:
-            i = item - capsule_first
-            _capsule_soft(
-                capsules[i], capsule_box[i], top, bottom, solid, light, depth, camera, lamp, shadow, matrix
-            )
-    _mean(light, picture)
-    _spill(picture, bright)
+        for column in range(layers.shape[1]):
+            for k in range(layers.shape[2]):
+                for channel in range(3):
+                    layers[row, column, k, channel] = colors[row, channel]
 
 
 @njit(cache=True, error_model="numpy")
@@ -552,36 +513,64 @@ def sort_into_bands(box, bands):
     return starts, lists
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy")
 def draw(
-    picture, bright, background, camera, offsets, layered, turns, solid_starts, solids, soft_starts, softs,
+    top, picture, bright, background, camera, offsets, layered, solids, softs,
     faces, face_box, balls, ball_box, capsules, capsule_box, lamp, shadow, matrix,
 ):  # fmt: skip
-    """Draw everything, in linear light.
+    """Draw the rows of one band, in linear light.
 
     Parameters
     ----------
-    picture : written, shape (height, width, 3).
+    top : the band's first row.
+    picture : written, shape (rows, width, 3).
     bright : written; what spills around bright things, of half the size.
-    background : colour of each row, shape (height, 3).
+    background : colour of each row, shape (rows, 3).
     camera : focal length and centre [pixels].
     offsets : samples within a pixel, shape (s, 2).
     layered : keep the samples apart until the end: needed when triangles are laid over.
-    turns : the order in which bands are handed out, so that each thread gets a part of the sky and of the floor.
-    solid_starts, solids, soft_starts, softs : lists of each band; numbers count faces, then balls, then capsules.
+    solids, softs : numbers of the things that touch the band; they count faces, then balls, then capsules.
     faces, face_box, balls, ball_box, capsules, capsule_box : rows of the tables.
     lamp : directions and colours of the light, see `lamp.py`.
     shadow, matrix : the shadow map.
     """
-    height = picture.shape[0]
-    for i in prange(len(turns)):
-        band = turns[i]
-        top = band * BAND
-        bottom = min(top + BAND, height)
-        _band(
-            top, bottom, picture[top:bottom], bright[top // 2 : (bottom + 1) // 2], background[top:bottom],
-            camera, offsets, layered,
-            solids[solid_starts[band] : solid_starts[band + 1]],
-            softs[soft_starts[band] : soft_starts[band + 1]],
-            faces, face_box, balls, ball_box, capsules, capsule_box, lamp, shadow, matrix,
-        )  # fmt: skip
+    bottom = top + picture.shape[0]
+    rows, width = picture.shape[0], picture.shape[1]
+    many = len(solids) > 0 or layered
+    light = np.empty((rows, width, offsets.shape[0] if many else 1, 3), dtype=np.float32)
+    depth = np.zeros((rows, width, light.shape[2]), dtype=np.float32)
+    _background(light, background)
+    capsule_first = len(faces) + len(balls)
+    solid = len(solids) > 0
+    for phase in range(2):
+        first = phase == 0
+        if many and not layered and not first:
+            # Nothing that follows needs the samples one by one.
+            _mean(light, picture)
+            light = np.empty((rows, width, 1, 3), dtype=np.float32)
+            _copy(picture, light)
+        for item in solids if first else softs:
+            if item < len(faces):
+                _face(
+                    faces[item], face_box[item], top, bottom, first, light, depth, camera, offsets, lamp, shadow, matrix
+                )
+            elif item < capsule_first:
+                i = item - len(faces)
+                if first:
+                    _ball_solid(balls[i], ball_box[i], top, bottom, light, depth, camera, offsets, lamp, shadow, matrix)
+                elif balls[i, 8] > ZERO:
+                    _ball_glow(balls[i], ball_box[i], top, bottom, solid, light, depth, camera)
+                else:
+                    _ball_soft(balls[i], ball_box[i], top, bottom, solid, light, depth, camera, lamp, shadow, matrix)
+            else:
+                i = item - capsule_first
+                if first:
+                    _capsule_solid(
+                        capsules[i], capsule_box[i], top, bottom, light, depth, camera, offsets, lamp, shadow, matrix
+                    )
+                else:
+                    _capsule_soft(
+                        capsules[i], capsule_box[i], top, bottom, solid, light, depth, camera, lamp, shadow, matrix
+                    )
+    _mean(light, picture)
+    _spill(picture, bright)

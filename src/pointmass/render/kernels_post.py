@@ -3,7 +3,9 @@
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
+
+from pointmass.render.inner import inner
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
@@ -13,7 +15,7 @@ BLINDING = np.float32(1e30)
 FADE = np.float32(0.35)  # how much a light that is too bright for its hue turns white
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _halve(fine, coarse):
     """Half the size, with weights 1 3 3 1 along both axes."""
     height, width = fine.shape[0], fine.shape[1]
@@ -34,7 +36,7 @@ def _halve(fine, coarse):
             coarse[row, column, 2] = b
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _neighbours(index, count):
     """The two coarse cells around a fine one: the nearer (weight 3/4) and the farther (1/4)."""
     near = min(index // 2, count - 1)
@@ -42,19 +44,20 @@ def _neighbours(index, count):
     return near, far
 
 
-@njit(cache=True, error_model="numpy")
-def _doubled(coarse, row, column, channel):
+@inner
+def _doubled(coarse, row, column):
     """A coarse image between its cells, at a cell of twice its size."""
     y, y2 = _neighbours(row, coarse.shape[0])
     x, x2 = _neighbours(column, coarse.shape[1])
-    return np.float32(0.0625) * (
-        np.float32(9.0) * coarse[y, x, channel]
-        + np.float32(3.0) * (coarse[y, x2, channel] + coarse[y2, x, channel])
-        + coarse[y2, x2, channel]
+    a, b, c = np.float32(9.0 / 16.0), np.float32(3.0 / 16.0), np.float32(1.0 / 16.0)
+    return (
+        a * coarse[y, x, 0] + b * (coarse[y, x2, 0] + coarse[y2, x, 0]) + c * coarse[y2, x2, 0],
+        a * coarse[y, x, 1] + b * (coarse[y, x2, 1] + coarse[y2, x, 1]) + c * coarse[y2, x2, 1],
+        a * coarse[y, x, 2] + b * (coarse[y, x2, 2] + coarse[y2, x, 2]) + c * coarse[y2, x2, 2],
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(nogil=True, cache=True, error_model="numpy")
 def bloom(bright, levels, decay):
     """Spread `bright` in place: the sum of blurs, each twice as wide as the last and `decay` times as strong."""
     pyramid = [bright]
@@ -68,12 +71,13 @@ def bloom(bright, levels, decay):
         keep = ZERO if level == 0 else ONE - decay
         for row in range(fine.shape[0]):
             for column in range(fine.shape[1]):
-                for channel in range(3):
-                    wide = _doubled(coarse, row, column, channel)
-                    fine[row, column, channel] = keep * fine[row, column, channel] + decay * wide
+                r, g, b = _doubled(coarse, row, column)
+                fine[row, column, 0] = keep * fine[row, column, 0] + decay * r
+                fine[row, column, 1] = keep * fine[row, column, 1] + decay * g
+                fine[row, column, 2] = keep * fine[row, column, 2] + decay * b
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _roll(value):
     """The identity up to the shoulder, then an exponential towards 1."""
     if value <= SHOULDER:
@@ -82,27 +86,25 @@ def _roll(value):
     return ONE - rest * np.float32(math.exp(-(value - SHOULDER) / rest))
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _byte(light, curve, dither):
     index = np.int64(math.sqrt(min(max(light, ZERO), ONE)) * np.float32(curve.shape[0] - 1) + HALF)
     return np.uint8(min(max(curve[index] + dither, ZERO), np.float32(255.0)))
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
-def develop(image, light, spill, strength, exposure, curve, pattern):
-    """Tone map `light` plus `strength` times `spill` (of half the size) into sRGB bytes.
+@njit(nogil=True, cache=True, error_model="numpy")
+def develop(first, last, image, light, spill, strength, exposure, curve, pattern):
+    """Rows [first, last): tone map `light` plus `strength` times `spill` (of half the size) into sRGB bytes.
 
     The brightest channel goes through the shoulder and the others keep their ratio to it, so that a bright glow keeps
     its hue; part of the way each channel goes alone, which turns the hottest light towards white as film does.
     """
-    height, width = light.shape[0], light.shape[1]
-    for row in prange(height):
-        for column in range(width):
+    for row in range(first, last):
+        for column in range(light.shape[1]):
             r, g, b = light[row, column, 0], light[row, column, 1], light[row, column, 2]
             if strength > ZERO:
-                r += strength * _doubled(spill, row, column, 0)
-                g += strength * _doubled(spill, row, column, 1)
-                b += strength * _doubled(spill, row, column, 2)
+                wide_r, wide_g, wide_b = _doubled(spill, row, column)
+                r, g, b = r + strength * wide_r, g + strength * wide_g, b + strength * wide_b
             r, g, b = exposure * r, exposure * g, exposure * b
             if not r + g + b < BLINDING:  # true for NaN too, which has no place in a table
                 r, g, b = ONE, ONE, ONE

@@ -3,27 +3,29 @@
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
-BANDS = 32
+from pointmass.render.inner import inner
+
+FAR = np.float32(np.inf)
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 HALF = np.float32(0.5)
 TINY = np.float32(1e-12)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _clamp(value, low, high):
     return min(max(value, low), high)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _keep_nearest(depth, row, column, value):
     if value < depth[row, column]:  # false for NaN
         depth[row, column] = value
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _span(low, high, first, last):
     """Whole texels between low and high, inside [first, last)."""
     a = np.int64(_clamp(math.floor(low), np.float32(first), np.float32(last)))
@@ -31,7 +33,7 @@ def _span(low, high, first, last):
     return a, b
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _cast_face(depth, r0, r1, c):
     ax, ay, bx, by, cx, cy = c[0], c[1], c[3], c[4], c[6], c[7]
     area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
@@ -50,7 +52,7 @@ def _cast_face(depth, r0, r1, c):
                 _keep_nearest(depth, row, column, c[2] + v * (c[5] - c[2]) + w * (c[8] - c[2]))
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _cast_capsule(depth, r0, r1, ax, ay, az, ra, bx, by, bz, rb):
     """A capsule seen across; a ball is one without length."""
     dx, dy = bx - ax, by - ay
@@ -69,18 +71,17 @@ def _cast_capsule(depth, r0, r1, ax, ay, az, ra, bx, by, bz, rb):
                 _keep_nearest(depth, row, column, az + t * (bz - az) - math.sqrt(rest))
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
-def cast(depth, faces, balls, capsules):
-    """Write the distance to the nearest caster into `depth`; all in texels."""
-    rows = depth.shape[0]
-    for band in prange(BANDS):
-        r0, r1 = band * rows // BANDS, (band + 1) * rows // BANDS
-        depth[r0:r1] = np.float32(np.inf)
-        for i in range(faces.shape[0]):
-            _cast_face(depth, r0, r1, faces[i])
-        for i in range(balls.shape[0]):
-            b = balls[i]
-            _cast_capsule(depth, r0, r1, b[0], b[1], b[2], b[3], b[0], b[1], b[2], b[3])
-        for i in range(capsules.shape[0]):
-            c = capsules[i]
-            _cast_capsule(depth, r0, r1, c[0], c[1], c[2], c[6], c[3], c[4], c[5], c[7])
+@njit(nogil=True, cache=True, error_model="numpy")
+def cast(first, last, depth, faces, balls, capsules):
+    """Write the distance to the nearest caster into the rows [first, last) of `depth`; all in texels."""
+    for row in range(first, last):
+        for column in range(depth.shape[1]):
+            depth[row, column] = FAR
+    for i in range(faces.shape[0]):
+        _cast_face(depth, first, last, faces[i])
+    for i in range(balls.shape[0]):
+        b = balls[i]
+        _cast_capsule(depth, first, last, b[0], b[1], b[2], b[3], b[0], b[1], b[2], b[3])
+    for i in range(capsules.shape[0]):
+        c = capsules[i]
+        _cast_capsule(depth, first, last, c[0], c[1], c[2], c[6], c[3], c[4], c[5], c[7])

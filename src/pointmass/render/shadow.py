@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pointmass.render.bands import each
 from pointmass.render.camera import View, turn
 from pointmass.render.tables import F32, F64, OPAQUE, Table
 
 TEXELS = 1024  # side of the map
+BAND = 64  # rows that one thread draws at a time
 MARGIN = 6  # free texels around it
 GROWTH = 1.25  # the map's extent is a power of this, so that shadows do not crawl when the scene breathes
 MANY = 1000  # larger clouds are measured by their percentiles
@@ -106,10 +108,8 @@ def shadow(all_casters: list[Casters], light: F64) -> Shadow:
     from pointmass.render import kernels_shadow
 
     depth = np.empty((TEXELS, TEXELS), dtype=np.float32)
-    kernels_shadow.cast(
-        depth,
-        *(np.ascontiguousarray(np.concatenate(parts), dtype=np.float32) for parts in (parts_f, parts_b, parts_c)),
-    )
+    rows = [np.ascontiguousarray(np.concatenate(parts), dtype=np.float32) for parts in (parts_f, parts_b, parts_c)]
+    each(lambda i: kernels_shadow.cast(i * BAND, (i + 1) * BAND, depth, *rows), TEXELS // BAND)
     return Shadow(depth, matrix)
 
 

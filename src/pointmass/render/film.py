@@ -1,0 +1,289 @@
+"""Frames into films: MP4, WebM, GIF, PNG. Streams; a film that fails leaves nothing behind."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.errors import InvalidInput, unknown
+from pointmass.frame import Camera, Frame
+from pointmass.render.camera import fit_camera
+from pointmass.render.image import checked_size, image
+from pointmass.render.style import Style
+
+Picture = NDArray[np.uint8]
+
+BT709 = 1  # FFmpeg's number for the colours of HD video
+LIMITED = 1  # luma from 16 to 235
+GIF_TICKS = 100  # a GIF counts time in hundredths of a second
+FASTEST = 1000  # frames per second
+
+
+class Writer(Protocol):
+    """Takes one picture after another; `path` is complete only after `close`."""
+
+    def add(self, picture: Picture, number: int) -> None:
+        """One more picture; `number` is its frame's."""
+
+    def close(self) -> None:
+        """All pictures are there: finish the file."""
+
+    def abort(self) -> None:
+        """Give up: release the file without finishing it."""
+
+
+class Video:
+    """A video file, encoded while the pictures come. Odd sizes get one more column or row."""
+
+    def __init__(self, path: Path, size: tuple[int, int], fps: Fraction, codec: str, options: dict[str, str]) -> None:
+        import av
+
+        container_options = {"movflags": "+faststart"} if path.suffix == ".mp4" else {}
+        self._container: Any = av.open(str(path), "w", options=container_options)
+        self._stream: Any = self._container.add_stream(codec, rate=fps, options=options)
+        self._stream.width, self._stream.height = (side + side % 2 for side in size)
+        self._stream.pix_fmt = "yuv420p"
+        # Without these tags players guess, and guess wrong by up to 40 of 255.
+        context = self._stream.codec_context
+        context.colorspace = context.color_primaries = context.color_trc = BT709
+        context.color_range = LIMITED
+        self._count = 0
+
+    def add(self, picture: Picture, number: int) -> None:
+        """Encode one picture."""
+        import av
+
+        odd = [(0, side % 2) for side in picture.shape[:2]]
+        if any(extra for _, extra in odd):
+            picture = np.pad(picture, [*odd, (0, 0)], mode="edge")
+        frame: Any = av.VideoFrame.from_ndarray(picture, format="rgb24")
+        frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
+        frame.pts = self._count
+        frame.time_base = 1 / self._stream.codec_context.framerate
+        self._count += 1
+        self._container.mux(self._stream.encode(frame))
+
+    def close(self) -> None:
+        """Encode what is still held back and finish the file."""
+        self._container.mux(self._stream.encode())
+        self._container.close()
+
+    def abort(self) -> None:
+        """Close the file as it is."""
+        self._container.close()
+
+
+class Gif:
+    """A GIF whose palette is made from the whole film; it holds all pictures until the end."""
+
+    def __init__(self, path: Path, size: tuple[int, int], fps: Fraction) -> None:
+        self._path, self._size, self._fps = path, size, min(fps, Fraction(GIF_TICKS, 2))
+        self._wanted = fps
+        self._graph: Any = None
+        self._count = 0
+        self._start()
+
+    def _start(self) -> None:
+        from av.filter import Graph
+
+        graph = Graph()
+        width, height = self._size
+        source = graph.add_buffer(width=width, height=height, format="rgb24", time_base=1 / self._fps)
+        split, palette = graph.add("split"), graph.add("palettegen", "stats_mode=diff")
+        use, sink = graph.add("paletteuse", "dither=bayer:bayer_scale=3"), graph.add("buffersink")
+        source.link_to(split)
+        split.link_to(palette, 0, 0)
+        split.link_to(use, 1, 0)
+        palette.link_to(use, 0, 1)
+        use.link_to(sink)
+        graph.configure()
+        self._graph = graph
+        self._seen = 0
+
+    def add(self, picture: Picture, number: int) -> None:
+        """Hand one picture to the palette; players show at most 50 a second, what is faster is left out."""
+        import av
+
+        keep = int(self._seen * self._fps / self._wanted) == self._count
+        self._seen += 1
+        if not keep:
+            return
+        frame: Any = av.VideoFrame.from_ndarray(picture, format="rgb24")
+        frame.pts, frame.time_base = self._count, 1 / self._fps
+        self._count += 1
+        self._graph.push(frame)
+
+    def close(self) -> None:
+        """Choose the palette and encode."""
+        import av
+
+        self._graph.push(None)
+        container: Any = av.open(str(self._path), "w", format="gif")
+        with container:
+            stream: Any = container.add_stream("gif", rate=self._fps)
+            stream.width, stream.height = self._size
+            stream.pix_fmt = "pal8"
+            for _ in range(self._count):
+                frame = self._graph.pull()
+                frame.time_base = 1 / self._fps
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode())
+
+    def abort(self) -> None:
+        """Forget the pictures."""
+        self._graph = None
+
+
+class Stills:
+    """PNG files: the last picture, or all of them when the name holds a pattern such as %04d."""
+
+    def __init__(self, path: Path, size: tuple[int, int], fps: Fraction) -> None:
+        self._path, self._sequence = path, "%" in path.name
+        self._last: Picture | None = None
+
+    def add(self, picture: Picture, number: int) -> None:
+        """Write the picture of a sequence, or keep it in case it is the last."""
+        if self._sequence:
+            _save(picture, self._path.with_name(self._path.name % number))
+        self._last = picture
+
+    def close(self) -> None:
+        """Write the last picture."""
+        if not self._sequence and self._last is not None:
+            _save(self._last, self._path)
+
+    def abort(self) -> None:
+        """Nothing is open."""
+
+
+def _save(picture: Picture, path: Path) -> None:
+    from PIL import Image
+
+    Image.fromarray(picture).save(path, format="PNG", compress_level=6)
+
+
+def _mp4(path: Path, size: tuple[int, int], fps: Fraction) -> Writer:
+    return Video(path, size, fps, "libx264", {"preset": "veryfast", "crf": "18"})
+
+
+def _webm(path: Path, size: tuple[int, int], fps: Fraction) -> Writer:
+    options = {"crf": "24", "b": "0", "deadline": "realtime", "cpu-used": "6", "row-mt": "1"}
+    return Video(path, size, fps, "libvpx-vp9", options)
+
+
+WRITERS: dict[str, Callable[[Path, tuple[int, int], Fraction], Writer]] = {
+    ".gif": Gif,
+    ".mp4": _mp4,
+    ".png": Stills,
+    ".webm": _webm,
+}
+
+
+def write(
+    frames: Iterable[Frame],
+    path: str | Path,
+    *,
+    fps: float | Fraction = 60,
+    camera: Camera | None = None,
+    size: tuple[int, int] = (1280, 720),
+    style: Style | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> None:
+    """Draw frames and write them to a file; its suffix says which kind.
+
+    Parameters
+    ----------
+    frames : read once, one at a time.
+    path : `.mp4`, `.webm`, `.gif`, or `.png`: the last frame, or a numbered sequence for a name such as `x_%04d.png`.
+    fps : pictures per second, above 0 and up to 1000.
+    camera : what it leaves open is chosen to show all frames when they are a list, else the first one.
+    size : width and height [pixels].
+    style : the look.
+    progress : called with the number of frames drawn so far, after each.
+
+    Raises
+    ------
+    InvalidInput : the suffix is not known, the folder cannot be written, there are no frames, or the size or the rate
+        is out of range. Nothing is written then, nor when the frames or an interrupt raise.
+    """
+    target = Path(path)
+    writer = _checked(target)
+    rate = _rate(fps)
+    size = checked_size(size)
+    if isinstance(frames, Sequence):
+        camera = fit_camera(frames, camera, size) if len(frames) else camera
+    try:
+        folder = Path(tempfile.mkdtemp(prefix=f".{target.stem[:32].replace('%', '_')}-", dir=target.parent))
+    except OSError as error:
+        raise InvalidInput(f"cannot write into folder {str(target.parent)!r}: {error.strerror}") from None
+    try:
+        _draw(frames, writer(folder / target.name, size, rate), camera, size, style, progress)
+        for made in sorted(folder.iterdir()):
+            made.replace(target.parent / made.name)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _draw(
+    frames: Iterable[Frame],
+    writer: Writer,
+    camera: Camera | None,
+    size: tuple[int, int],
+    style: Style | None,
+    progress: Callable[[int], None] | None,
+) -> None:
+    """Every frame to the writer; on any exception, an interrupt too, the writer gives up."""
+    count = 0
+    try:
+        for frame in frames:
+            if count == 0:
+                camera = fit_camera([frame], camera, size)
+            writer.add(image(frame, camera=camera, size=size, style=style), frame.number)
+            count += 1
+            if progress is not None:
+                progress(count)
+        if count == 0:
+            raise InvalidInput("there are no frames to write")
+    except BaseException:
+        writer.abort()
+        raise
+    writer.close()
+
+
+def _checked(target: Path) -> Callable[[Path, tuple[int, int], Fraction], Writer]:
+    """The writer for the name's suffix."""
+    writer = WRITERS.get(target.suffix.lower())
+    if writer is None:
+        raise unknown("kind of picture or film", target.suffix, WRITERS)
+    if not target.parent.is_dir():
+        raise InvalidInput(f"cannot write {str(target)!r}: there is no folder {str(target.parent)!r}")
+    if target.is_dir():
+        raise InvalidInput(f"cannot write {str(target)!r}: it is a folder")
+    if writer is Stills and "%" in target.name:
+        try:
+            numbered = target.name % 1 != target.name % 2
+        except (TypeError, ValueError):
+            numbered = False
+        if not numbered:
+            raise InvalidInput(f"cannot write {target.name!r}: a sequence needs one number, such as x_%04d.png")
+    return writer
+
+
+def _rate(fps: float | Fraction) -> Fraction:
+    """Frames per second as a fraction with a small denominator: 29.97 becomes 30000/1001 or near it."""
+    try:
+        valid = math.isfinite(fps) and 0 < fps <= FASTEST
+    except TypeError:
+        valid = False
+    rate = Fraction(fps).limit_denominator(1001) if valid else Fraction(0)
+    if rate <= 0:
+        raise InvalidInput(f"fps = {fps} is not allowed: it must be above 0 and at most {FASTEST}")
+    return rate
