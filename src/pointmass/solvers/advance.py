@@ -16,6 +16,7 @@ from pointmass.solvers.islands import Islands, Mask, chosen_memory, number_of
 SET_BACKS = 10_000  # how often one island may be set back on the way to the end
 NEARLY = 1.01  # a step this much longer reaches the end: take it rather than leave a splinter
 
+Prepare = Callable[[Array, Array, Array], Array]
 Correct = Callable[[Step, Array], tuple[Array, Array, Mask]]
 
 
@@ -54,6 +55,7 @@ def advance(
     memory: Memory,
     *,
     clock: Array | None = None,
+    prepare: Prepare | None = None,
     correct: Correct | None = None,
 ) -> tuple[Array, Memory, Stats]:
     """The state at t1, to which every island comes exactly.
@@ -68,6 +70,8 @@ def advance(
     y : state at the start, shape (dim,).
     memory : what the last call returned, or ``{}``.
     clock : where each island begins, in [t0, t1], shape (islands,); t0 if None.
+    prepare : called before each trial, ``prepare(clock, h, y) -> y``, with the clock and the step of each island, shape
+        (islands,), 0 where none is made. A rejected trial is prepared again with a shorter step.
     correct : called after each step that some island keeps, ``correct(step, h) -> (y, clock, reset)``. `h` is the
         length of the step of each island, shape (islands,), 0 where none was made or it was rejected; there `step`
         stands still. It returns the state, a clock for each island (one before the end of the step sets the island
@@ -88,7 +92,7 @@ def advance(
     run = _Run(system, solver, t0, t1, y, memory, clock)
     with np.errstate(all="ignore"):  # what overflows is found and named below
         while (run.clock < t1).any():
-            run.step(correct)
+            run.step(prepare, correct)
     run.stats.evaluations = run.system.evaluations
     return run.y, run.memory, run.stats
 
@@ -113,12 +117,14 @@ class _Run:
         self.set_backs = np.zeros(n, np.intp)
         self.stats = Stats()
 
-    def step(self, correct: Correct | None) -> None:
+    def step(self, prepare: Prepare | None, correct: Correct | None) -> None:
         """One trial of every island that has not arrived."""
         left = self.end - self.clock
         wanted = self._wanted(left)
         last = wanted * NEARLY >= left
         h = np.where(last, left, wanted)
+        if prepare is not None:
+            self.y = prepare(self.clock, h, self.y)
         trial = self._trial(h)
         kept, control = self._judge(trial, h, wanted)
         self._check_finite(trial, kept)

@@ -62,7 +62,7 @@ def first_root(
         open_ = found & (b - a > goal)
         if not open_.any():
             break
-        x = _itp(a, b, fa, fb, 0.5 * goal * 2.0 ** (half - k), width)
+        x = _itp(a, b, fa, fb, width, goal, 0.5 * goal * 2.0 ** (half - k))
         fx = g(np.where(open_, x, a))
         left = (fx >= 0.0) == (fa >= 0.0)
         a, fa = np.where(open_ & left, x, a), np.where(open_ & left, fx, fa)
@@ -71,14 +71,17 @@ def first_root(
     return low, high, g_low, g_high
 
 
-def _itp(a: Array, b: Array, fa: Array, fb: Array, reach: Array, width: Array) -> Array:
-    """Interpolate, truncate towards the middle, project into what bisection would have left of the bracket."""
+def _itp(a: Array, b: Array, fa: Array, fb: Array, width: Array, goal: Array, reach: Array) -> Array:
+    """Interpolate, truncate towards the middle, project into what bisection would have left of the bracket.
+
+    The truncation is at least a quarter of the goal: less would be lost in round-off, and the far side never follow.
+    """
     middle, gap = 0.5 * (a + b), b - a
     slope = np.where(fb == fa, 1.0, fb - fa)
-    secant = np.where(fb == fa, middle, (fb * a - fa * b) / slope)
+    secant = np.where(np.abs(fa) <= np.abs(fb), a - fa * (gap / slope), b - fb * (gap / slope))
     secant = np.where(np.isfinite(secant), secant, middle)
     side = np.sign(middle - secant)
-    cut = 0.2 * gap * gap / np.where(width > 0.0, width, 1.0)
+    cut = np.maximum(0.2 * gap * gap / np.where(width > 0.0, width, 1.0), 0.25 * goal)
     truncated = np.where(cut <= np.abs(middle - secant), secant + side * cut, middle)
     spare = np.maximum(reach - 0.5 * gap, 0.0)
     x = np.where(np.abs(truncated - middle) <= spare, truncated, middle - side * spare)

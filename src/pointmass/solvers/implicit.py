@@ -61,7 +61,8 @@ class Implicit(Solver):
         length = np.broadcast_to(np.asarray(h, y.dtype), y.shape)
         z, gamma = self._stage(y, length, memory)
         stage, iterations = self._newton.solve(system, t + self.c * h, z, gamma, y)
-        y1 = moved(h, y, stage if self.c == 1.0 else y + (stage - y) / self.c)
+        rise = stage - y
+        y1 = moved(h, y, stage if self.c == 1.0 else moved(rise, y, y + rise / self.c))
         dense = straight(h, y, y1, system.order == 2)
         return Step(t, h, y, y1, dense, self._remember(y, length, memory), iterations=iterations)
 

@@ -17,7 +17,7 @@ from pointmass.solvers.events import Event, first_root
 from pointmass.solvers.islands import Mask, number_of
 
 PIECES = 4  # parts of each step in which an event is looked for
-ON_GRID = 1e-9  # of dt: an end this close to the grid is on it
+ON_GRID = 1e-9  # of a step: a time this close to its end is on it
 
 
 @final
@@ -44,9 +44,10 @@ class Interval:
             return self.y1
         y = self.y0
         for step in self.steps:
-            begun = (step.t <= t) & np.greater(step.h, 0.0)
-            theta = np.clip((t - step.t) / np.where(np.equal(step.h, 0.0), 1.0, step.h), 0.0, 1.0)
-            y = np.where(begun, step.dense(theta), y)
+            theta = (t - step.t) / np.where(np.equal(step.h, 0.0), 1.0, step.h)
+            inside = np.greater(step.h, 0.0) & (theta >= 0.0) & (theta <= 1.0 + ON_GRID)  # clocks have round-off
+            if inside.any():
+                y = np.where(inside, step.dense(np.clip(theta, 0.0, 1.0)), y)
         return y
 
     def knots(self) -> Array:
@@ -203,7 +204,10 @@ def _crossings(interval: Interval, event: Event, knots: Array) -> list[float]:
     def g(times: Array) -> Array:
         return np.array([event.g(float(t), interval.at(float(t))) for t in times])
 
-    _, after, _, value = first_root(g, knots[:-1], knots[1:])
-    rising = value >= 0.0
-    wanted = np.isfinite(after) & (rising if event.direction > 0 else ~rising if event.direction < 0 else True)
-    return [float(t) for t in after[wanted]]
+    positive = g(knots) >= 0.0
+    changes = np.diff(positive.astype(np.intp))
+    wanted = np.flatnonzero(changes if event.direction == 0 else changes == event.direction)
+    if not len(wanted):
+        return []
+    _, after, _, _ = first_root(g, knots[wanted], knots[wanted + 1])
+    return [float(t) for t in after]

@@ -80,7 +80,9 @@ class ConjugateGradients:
     """By conjugate gradients on the symmetric part of M times the matrix, with block-Jacobi preconditioning.
 
     Each island has step lengths and an end of its own, so that islands do not influence each other. Only movable
-    entries take part. What is not symmetric, some damping, is left to Newton's method to correct.
+    entries take part. What is not symmetric, some damping, is left to Newton's method to correct. Compressed springs
+    make the matrix indefinite; the iteration goes on through directions that curve downwards, because the steps of
+    Newton's method that stop there do not converge for stiff chains.
 
     Parameters
     ----------
@@ -121,7 +123,7 @@ class ConjugateGradients:
         for _ in range(self.restarts * int(np.bincount(islands).max())):
             q = matrix @ p
             curvature = total(p * q, islands, n)
-            going = (rho > goal) & (curvature > 0.0)  # a direction that does not curve upwards ends the island
+            going = (rho > goal) & (curvature != 0.0)
             if not going.any():
                 break
             alpha = np.divide(rho, curvature, out=np.zeros(n), where=going)[islands]
@@ -130,8 +132,7 @@ class ConjugateGradients:
             fresh = np.where(going, total(r * z, islands, n), rho)
             p = z + np.divide(fresh, rho, out=np.zeros(n), where=going)[islands] * p
             rho = np.where(going, fresh, 0.0)
-        bare = (rho > goal) & ~np.bincount(islands, weights=x != 0.0, minlength=n).astype(np.bool_)
-        return np.where(bare[islands], precondition @ load, x)  # no upward curve at all: go down the gradient
+        return x
 
 
 def block_inverse(matrix: Any, free: NDArray[np.bool_]) -> Any:
