@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.description import Described
-from pointmass.errors import InvalidInput, number
+from pointmass.errors import InvalidInput, finite_array, number
 from pointmass.laws.parameter import Parameter, Vector
 
 Array = NDArray[np.floating[Any]]
@@ -18,9 +18,9 @@ Contact = Literal["swept", "discrete"]
 
 
 class Collider(Described, ABC):
-    """A surface that particles bounce off: `V' = V_T - k_r V_N` (lecture, "Collision Response"), with Coulomb friction on V_T.
+    """A surface that particles bounce off: V' = V_T - k_r V_N (lecture, "Collision Response").
 
-    The free side is where the signed distance is positive.
+    Coulomb friction acts on V_T. The free side is where the signed distance is positive.
 
     Attributes
     ----------
@@ -29,8 +29,8 @@ class Collider(Described, ABC):
     eps : how near is in contact [m].
     contact : "swept": nothing tunnels, the time of impact is found; "discrete": the lecture's test at the end of each step.
     place : the reference point [m]; it may move as a function of t.
-    bulges : True where the solid is convex (ball, block), so that the distance along a line is convex; False where the
-        free space is (room, inside of a sphere).
+    bulges : True where the solid is convex (ball, block): a line between two free points may pass through it. False
+        where the free space is convex (plane, inside of a sphere).
     """
 
     bulges: ClassVar[bool] = True
@@ -66,6 +66,18 @@ class Collider(Described, ABC):
     def local_normal(self, x: Array) -> Array:
         """Gradient of the distance, unit vectors, shape (k, 3)."""
 
+    def bending(self, x: Array, v: Array) -> Array:
+        """v . H v with H the Hessian of the distance [m/s^2], shape (k,): how fast a surface curves away under a velocity.
+
+        `x` is relative to the place. 0 for flat surfaces.
+        """
+        return np.zeros(len(x), x.dtype)
+
+    @property
+    def surfaces(self) -> Sequence[Collider]:
+        """The surfaces that it consists of, each with a smooth distance: a room has six walls."""
+        return (self,)
+
     @abstractmethod
     def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:
         """Corners relative to the place and triangles, for pictures; what is infinite is drawn `size` [m] wide."""
@@ -89,6 +101,20 @@ class Collider(Described, ABC):
     def acceleration(self, t: Any) -> Array:
         """Acceleration of the surface [m/s^2], shape (3,) or (k, 3)."""
         return _columns(self.acceleration_parameter.at(t))
+
+
+def unit(name: str, value: Any) -> NDArray[np.float64]:
+    """A direction as a unit vector."""
+    array = finite_array(name, value, (3,))
+    size = float(np.linalg.norm(array))
+    if size == 0:
+        raise InvalidInput(f"{name} = {value} is not allowed: it must not be zero")
+    return array / size
+
+
+def rows_dot(a: Array, b: Array) -> Array:
+    """Scalar product row by row, added left to right (not np.einsum, whose order depends on the machine)."""
+    return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
 
 
 def _columns(parts: Sequence[Any]) -> Array:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from functools import partial
+from typing import Any, overload
 
 import numpy as np
 
@@ -19,8 +20,9 @@ class ArrayForce(Force):
 
     Parameters
     ----------
-    function : `function(x, v, m, t, **constants) -> f`: x, v, f of shape (n, 3), m of shape (n,). It must be pure. Each
-        particle's force may depend on that particle only (`coupled=False`) or on all of them (`coupled=True`).
+    function : `function(x, v, m, t, **constants) -> f`: x, v, f of shape (n, 3), m of shape (n,); f may be one vector for
+        all. It must be pure. Each particle's force may depend on that particle only (`coupled=False`) or on all of
+        them (`coupled=True`). Where particles have clocks of their own, t has shape (n,).
     constants : passed to the function by name.
     coupled : whether particles act on each other.
     on, enabled : as for every force; the function sees the selected rows.
@@ -46,14 +48,11 @@ class ArrayForce(Force):
 
     @property
     def name(self) -> str:
-        return getattr(self.function, "__name__", "ArrayForce")
+        return getattr(self.function, "__name__", "array_force")
 
     @property
     def velocity_dependent(self) -> bool:
         return True
-
-    def bind(self, particles: Particles) -> None:
-        particles.select(self.on)
 
     def add_forces(self, particles: Particles, t: Any, x: Array, v: Array, f: Array) -> None:
         rows = particles.select(self.on)
@@ -62,7 +61,8 @@ class ArrayForce(Force):
     def add_jacobian(self, particles: Particles, t: Any, x: Array, v: Array, blocks: Blocks) -> None:
         if self.coupled:
             raise InvalidInput(
-                f"{self.name} couples particles in NumPy: implicit solvers need a law; use pm.spring_force or an explicit solver"
+                f"{self.name} couples particles in NumPy, and implicit solvers need a law: "
+                "use pm.spring_force or an explicit solver"
             )
         rows = particles.select(self.on)
         result = np.empty((2, len(rows), 3, 3), x.dtype)
@@ -84,12 +84,29 @@ class ArrayForce(Force):
 
     def _evaluate(self, particles: Particles, t: Any, x: Array, v: Array, rows: Any) -> Array:
         now = t[rows] if isinstance(t, np.ndarray) else t
-        result = np.asarray(self.function(x[rows], v[rows], particles.m[rows], now, **self.constants))
-        if result.shape != (len(rows), 3):
+        try:
+            result = np.asarray(self.function(x[rows], v[rows], particles.m[rows], now, **self.constants), x.dtype)
+        except Exception as error:
+            raise InvalidInput(f"{self.name} failed: {type(error).__name__}: {error}") from error
+        if result.shape not in ((len(rows), 3), (3,)):
             raise InvalidInput(f"{self.name} must return an array of shape ({len(rows)}, 3), not {result.shape}")
-        return result
+        return np.broadcast_to(result, (len(rows), 3))
 
 
-def array_force(function: Function) -> ArrayForce:
-    """Make a force from a NumPy function of whole arrays: see `ArrayForce`."""
-    return ArrayForce(function)
+@overload
+def array_force(function: Function, /) -> ArrayForce: ...
+@overload
+def array_force(**options: Any) -> Callable[[Function], ArrayForce]: ...
+def array_force(function: Function | None = None, /, **options: Any) -> Any:
+    """Make a force from a NumPy function of whole arrays: see `ArrayForce`, which lists the options.
+
+    Examples
+    --------
+    >>> @pm.array_force
+    ... def swirl(x, v, m, t):
+    ...     return np.cross([0, 1, 0], x)
+    >>> @pm.array_force(coupled=True)
+    ... def gather(x, v, m, t):
+    ...     return x.mean(axis=0) - x
+    """
+    return partial(ArrayForce, **options) if function is None else ArrayForce(function, **options)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import linecache
 from collections.abc import Callable, Sequence
+from functools import cache
 from hashlib import sha256
 from typing import Any
 
@@ -14,6 +16,7 @@ from pointmass.laws.functions import NUMPY
 from pointmass.laws.program import Program, Symbol, operands
 
 INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "and": "&", "or": "|"}
+FLOATS = (np.dtype(np.float64), np.dtype(np.float32))
 
 
 def expanded(program: Program) -> Program:
@@ -72,20 +75,41 @@ def source(program: Program, arguments: Sequence[str], name: str) -> str:
 
 
 def columns(program: Program, arguments: Sequence[str], name: str = "law") -> Callable[..., tuple[Any, ...]]:
-    """The program as a function of arrays (one for each argument) that returns one array or number per output."""
+    """The program as a function of arrays (one for each argument) that returns one array or number per output.
+
+    It computes in float32 where an argument is float32, else in float64, from the first operation to the last.
+    """
     text = source(program, arguments, name)
     file = f"<pointmass law {name} {sha256(text.encode()).hexdigest()[:12]}>"
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # tracebacks show the line
-    scope: dict[str, Any] = {f"{op}_": function for op, function in NUMPY.items()}
-    scope |= {"calls": _calls(expanded(program)), "inf": np.inf, "nan": np.nan}
-    exec(compile(text, file, "exec"), scope)
-    function = scope[name]
+    code = compile(text, file, "exec")
+    scopes: dict[np.dtype[Any], dict[str, Any]] = {}
+    for dtype in FLOATS:
+        scopes[dtype] = {f"{op}_": function for op, function in NUMPY.items()}
+        scopes[dtype] |= {"calls": _calls(expanded(program)), "inf": np.inf, "nan": np.nan, "where_": _where(dtype)}
+        exec(code, scopes[dtype])
 
     def run(*values: Any) -> tuple[Any, ...]:
+        dtype = FLOATS[any(getattr(v, "dtype", None) == FLOATS[1] for v in values)]
+        typed = (np.asarray(v, dtype)[()] for v in values)
         with np.errstate(all="ignore"):  # the branch that `where` drops may divide by zero; divergence is found in f
-            return function(*values)  # type: ignore[no-any-return]
+            return scopes[dtype][name](*typed)  # type: ignore[no-any-return]
 
     return run
+
+
+@cache
+def elementary(name: str) -> Callable[..., tuple[Any, ...]]:
+    """sin, exp, ... of arrays: what a law's columns run, so that they agree on every bit."""
+    program = Program()
+    names = list(inspect.signature(EXPANSIONS[name]).parameters)
+    program.outputs = [program.operation(name, *(program.argument(n) for n in names))]
+    return columns(program, names, name)
+
+
+def _where(dtype: np.dtype[Any]) -> Callable[[Any, Any, Any], Any]:
+    """np.where whose branches have the precision of the law, also where both are literals."""
+    return lambda c, a, b: np.where(c, np.asarray(a, dtype), np.asarray(b, dtype))[()]
 
 
 def _calls(program: Program) -> list[Any]:

@@ -59,6 +59,15 @@ def jacobian(program: Program, arguments: Sequence[str]) -> Program:
     return Program(program.nodes, [rows[a][o] for o in range(len(program.outputs)) for a in range(len(arguments))])
 
 
+def gradient(value: Any, vector: Sequence[Symbol]) -> tuple[Any, Any, Any]:
+    """Exact gradient of a traced number with respect to a vector argument of the law."""
+    if not isinstance(value, Symbol):
+        return 0.0, 0.0, 0.0
+    program = value.program
+    slopes = (differentiate(program, [value.node], program.nodes[c.node][1])[0] for c in vector)
+    return tuple(Symbol(program, s) for s in slopes)  # type: ignore[return-value]
+
+
 def _node_derivative(program: Program, i: int, name: str, known: dict[int, int], zero: int) -> int:
     op, *_ = node = program.nodes[i]
     if op == "arg" and node[1] == name:

@@ -57,7 +57,8 @@ def exp(a: Number) -> Number:
     inside = minimum(maximum(a, -750.0), 710.0)
     k = floor(inside * (1.0 / math.log(2.0)) + 0.5)
     r = (inside - k * LOG_2[0]) - k * LOG_2[1]
-    return where(a == a, operation("ldexp", polynomial(EXP, r), where(k == k, k, 0.0)), a)
+    a_number = absolute(a) >= 0.0  # not NaN, which has no whole part
+    return where(a_number, operation("ldexp", polynomial(EXP, r), where(a_number, k, 0.0)), a)
 
 
 def log(a: Number) -> Number:
@@ -74,9 +75,12 @@ def log(a: Number) -> Number:
 
 
 def pow(a: Number, b: Number) -> Number:
-    """exp(b log a) for a > 0; 0 for a = 0 and b > 0."""
-    value = exp(b * log(a))
-    return where(a == 0.0, where(b > 0.0, 0.0, where(b == 0.0, 1.0, math.inf)), value)
+    """exp(b log |a|), with a sign where a < 0 and b is whole."""
+    value = exp(b * log(absolute(a)))
+    sign = where(b == 2.0 * floor(0.5 * b), 1.0, where(b == floor(b), -1.0, math.nan))
+    value = where(a < 0.0, sign * value, value)
+    value = where(a == 0.0, where(b > 0.0, 0.0, math.inf), value)
+    return where(b == 0.0, 1.0, value)
 
 
 def atan2(y: Number, x: Number) -> Number:

@@ -14,14 +14,14 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pointmass.errors import InvalidInput
+from pointmass.errors import InvalidInput, whole_number
 from pointmass.laws import functions as fn
-from pointmass.laws.derivative import differentiate
+from pointmass.laws.derivative import gradient
 from pointmass.laws.force import Array, Blocks, Force, Rows, clock, inputs_for, matrix
 from pointmass.laws.parameter import Parameter
-from pointmass.laws.program import Symbol
+from pointmass.laws.program import flatten
 from pointmass.laws.trace import Traced, trace, vector_names
-from pointmass.laws.unary import law_parameters, parameters_from
+from pointmass.laws.unary import law_name, law_parameters, origin, parameters_from
 from pointmass.particles import Particles
 
 
@@ -47,8 +47,8 @@ class ElementForce(Force):
 
     def __init__(self, ids: ArrayLike, parameters: list[Parameter], enabled: bool = True) -> None:
         super().__init__(parameters, enabled=enabled)
-        self.ids = _node_ids(type(self).__name__, ids, self.nodes)
-        self._rows: Rows | None = None
+        self.ids = _node_ids(self.name, ids, self.nodes)
+        self._rows: tuple[int, Rows] | None = None  # version of the particles, and rows of the ids then
 
     def measure(self) -> Callable[..., Any] | None:
         """The function of (x1, ..., xk, t, *parameters) that is the element's energy, if it has one."""
@@ -73,6 +73,7 @@ class ElementForce(Force):
         return any(name in self.traced.depends_on for name in self._names("v"))
 
     def bind(self, particles: Particles) -> None:
+        super().bind(particles)
         rows = particles.rows(self.ids)
         if (rows < 0).any():
             element, node = np.argwhere(rows < 0)[0]
@@ -83,15 +84,15 @@ class ElementForce(Force):
                 raise InvalidInput(
                     f"{p.name} of {self.name} belongs to elements: it may depend on t, not on {sorted(p.attributes)}"
                 )
-        self._rows = rows
+        self._rows = (particles.version, rows)
         _ = self.traced
 
     def rows(self, particles: Particles) -> Rows:
         """Rows of the particles of each element, shape (e, nodes)."""
-        if self._rows is None:
+        if self._rows is None or self._bound is not particles or self._rows[0] != particles.version:
             self.bind(particles)
         assert self._rows is not None
-        return self._rows
+        return self._rows[1]
 
     def add_forces(self, particles: Particles, t: Any, x: Array, v: Array, f: Array) -> None:
         rows = self.rows(particles)
@@ -125,7 +126,7 @@ class ElementForce(Force):
         return sorted({int(r) for r in rows[(rows == row).any(axis=1)].ravel()} - {row})
 
     def keep(self, particles: Particles, mask: NDArray[np.bool_]) -> None:
-        whole = mask[self.rows(particles)].all(axis=1)
+        whole: NDArray[np.bool_] = np.all(mask[self.rows(particles)], axis=1)
         self.ids = self.ids[whole]
         self._rows = None
         for p in self.parameters.values():
@@ -151,17 +152,19 @@ class ElementForce(Force):
 
     def _all_nodes(self, *arguments: Any) -> Any:
         forces = self.law(*arguments)
-        parts = forces if isinstance(forces[0], (tuple, list)) else [forces]
-        if len(parts) == self.nodes - 1:
-            total = parts[0]
-            for part in parts[1:]:
-                total = fn.add(total, part)
-            parts = [*parts, tuple(-c for c in total)]
-        return parts
+        if forces is None:
+            return None
+        numbers = list(flatten(forces))
+        if len(numbers) not in (3 * self.nodes, 3 * self.nodes - 3):
+            nodes = "the first particle" if self.nodes == 2 else f"all {self.nodes} particles or all but the last"
+            raise InvalidInput(f"it must return three numbers for {nodes}, but returned {len(numbers)} in all")
+        if len(numbers) < 3 * self.nodes:
+            numbers += [-sum(numbers[axis + 3 :: 3], start=numbers[axis]) for axis in range(3)]
+        return numbers
 
     def _inputs(self, law: Traced, particles: Particles, t: Any, x: Array, v: Array) -> list[Any]:
         rows = self.rows(particles)
-        now = clock(t, rows[:, 0], x.dtype)
+        now = clock(t, rows[:, 0])
         vectors = {f"{n}{a + 1}": q[rows[:, a]] for a in range(self.nodes) for n, q in (("x", x), ("v", v))}
         everything = np.arange(len(rows))
         parameters = {p.name: p.of(particles, now, everything) for p in self.parameters.values()}
@@ -211,13 +214,6 @@ class ConstraintForce(ElementForce):
         return matrix(traced.columns(*inputs), len(rows), x.dtype)[:, 0]
 
 
-def gradient(value: Symbol, vector: tuple[Symbol, Symbol, Symbol]) -> tuple[Symbol, Symbol, Symbol]:
-    """Exact gradient of a traced number with respect to a vector argument of the law."""
-    program = value.program
-    slopes = (differentiate(program, [value.node], program.nodes[c.node][1])[0] for c in vector)
-    return tuple(Symbol(program, s) for s in slopes)  # type: ignore[return-value]
-
-
 def spring_force(law: Callable[..., Any]) -> type[ElementForce]:
     """Make a force between pairs of particles from a law.
 
@@ -249,6 +245,8 @@ def element_force(nodes: int) -> Callable[[Callable[..., Any]], type[ElementForc
     The law returns the forces on all nodes, or on all but the last, which takes minus their sum.
     """
 
+    nodes = whole_number("nodes", nodes, at_least=2)
+
     def decorate(law: Callable[..., Any]) -> type[ElementForce]:
         fixed = [f"{q}{a + 1}" for a in range(nodes) for q in "xv"] + ["t"]
         own = law_parameters(law, fixed)
@@ -256,18 +254,12 @@ def element_force(nodes: int) -> Callable[[Callable[..., Any]], type[ElementForc
 
         def __init__(self: Any, *, enabled: bool = True, **given: Any) -> None:
             if argument not in given:
-                raise InvalidInput(f"law {law.__name__!r} needs {argument!r}: ids of particles, shape (e, {nodes})")
+                raise InvalidInput(f"law {law_name(law)!r} needs {argument!r}: ids of particles, shape (e, {nodes})")
             ids = given.pop(argument)
             ElementForce.__init__(self, ids, parameters_from(law, own, given), enabled=enabled)
 
-        body = {
-            "__init__": __init__,
-            "law": staticmethod(law),
-            "nodes": nodes,
-            "__doc__": law.__doc__,
-            "__module__": law.__module__,
-        }
-        return type(law.__name__, (ElementForce,), body)
+        body = {"__init__": __init__, "law": staticmethod(law), "nodes": nodes, **origin(law)}
+        return type(law_name(law), (ElementForce,), body)
 
     return decorate
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.description import Described
+from pointmass.errors import InvalidInput
 from pointmass.laws.parameter import Parameter
 from pointmass.laws.trace import Traced, vector_names
 from pointmass.particles import Particles, Selection
@@ -52,11 +55,14 @@ class Blocks:
 class Force(Described, ABC):
     """A law with its parameters, acting on a selection of particles.
 
+    `force.set(k=0.3)` changes parameters of a force that is in use; `force.enabled = False` switches it off.
+
     Attributes
     ----------
     order : 2: adds forces [N] to particles with mass; 1: adds velocities [m/s] in a flow.
     internal : whether the forces of the law sum to zero (action and reaction).
     parameters : by name; `set` changes them.
+    arguments : what the force was made with, or set to since, by name.
     on : particles that it acts on; None = all.
     enabled : whether it acts at all.
     """
@@ -68,18 +74,59 @@ class Force(Described, ABC):
         self.parameters = {p.name: p for p in parameters}
         self.on = on
         self.enabled = bool(enabled)
+        self._bound: Particles | None = None
+
+    def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]:
+        return (), self.arguments  # copies and pickles are made like the force itself
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {k: v for k, v in self.__dict__.items() if not isinstance(getattr(type(self), k, None), cached_property)}
 
     @property
     def name(self) -> str:
-        """Name for messages."""
-        return type(self).__name__
+        """Name for messages, scene files and reports: quadratic_drag for QuadraticDrag."""
+        return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", type(self).__name__).lower()
+
+    def set(self, **values: Any) -> None:
+        """Replace parameters; the values are checked like those of the constructor, and nothing is traced again.
+
+        Raises
+        ------
+        InvalidInput
+            A parameter that the force does not have or that cannot change, a value that is not allowed. The force
+            keeps what it had.
+
+        Examples
+        --------
+        >>> drag.set(k=0.3)
+        >>> wind.set(velocity=("3*sin(t)", 0, 0))
+        """
+        fresh = type(self)(**self._arguments_with(values))
+        for name in values:
+            old, new = self.parameters.get(name), fresh.parameters.get(name)
+            if old is None or new is None or old.vector != new.vector:
+                known = ", ".join(self.parameters) or "none"
+                raise InvalidInput(
+                    f"{name} of {self.name} cannot be set to another kind of value: {known} can be set; "
+                    "for the rest make a new force"
+                )
+        before = {name: list(self.parameters[name].components) for name in values}
+        for name in values:
+            self.parameters[name].components[:] = fresh.parameters[name].components
+        try:
+            if self._bound is not None:
+                self.bind(self._bound)
+        except InvalidInput:
+            for name, components in before.items():
+                self.parameters[name].components[:] = components
+            raise
+        self.arguments = fresh.arguments
 
     @property
     @abstractmethod
     def velocity_dependent(self) -> bool:
         """Whether the law depends on velocities."""
 
-    @abstractmethod
     def bind(self, particles: Particles) -> None:
         """Check the force against the particles that it will act on.
 
@@ -88,10 +135,15 @@ class Force(Described, ABC):
         InvalidInput
             A particle, attribute or group that does not exist, a column of another length.
         """
+        rows = particles.select(self.on)
+        if self.on is not None and not isinstance(self.on, str):
+            self.on = np.zeros(len(particles), bool)
+            self.on[rows] = True
+        self._bound = particles
 
     @abstractmethod
     def add_forces(self, particles: Particles, t: Any, x: Array, v: Array, f: Array) -> None:
-        """Add the force at (t, x, v) to the accumulators `f`, shape (n, 3). `t` is a number or one for each particle."""
+        """Add the force at (t, x, v) to the accumulators `f`, shape (n, 3); `t` is a number or one per particle."""
 
     @abstractmethod
     def add_jacobian(self, particles: Particles, t: Any, x: Array, v: Array, blocks: Blocks) -> None:
@@ -111,17 +163,17 @@ class Force(Described, ABC):
 
     def keep(self, particles: Particles, mask: NDArray[np.bool_]) -> None:
         """Follow the removal of particles; called before it happens."""
-        if self.on is not None and not isinstance(self.on, str):
-            selected = np.zeros(len(mask), bool)
-            selected[particles.select(self.on)] = True
-            self.on = selected[mask]
+        if isinstance(self.on, np.ndarray):
+            self.on = self.on[mask]
 
     def grow(self, particles: Particles, count: int) -> None:
         """Follow the birth of `count` particles, already added at the end."""
-        if self.on is not None and not isinstance(self.on, str):
-            selected = np.zeros(len(particles), bool)
-            selected[: len(particles) - count][Particles.select(particles, self.on)] = True
-            self.on = selected
+        if isinstance(self.on, np.ndarray):
+            self.on = np.concatenate([self.on, np.zeros(count, bool)])
+
+    def _arguments_with(self, values: dict[str, Any]) -> dict[str, Any]:
+        """The constructor's arguments with other values of parameters."""
+        return self.arguments | values
 
 
 def inputs_for(
@@ -136,9 +188,9 @@ def inputs_for(
     return [values[i] for i in traced.inputs]
 
 
-def clock(t: Any, rows: Any, dtype: Any) -> Any:
-    """The time of each of `rows`: t itself, or its entries where each particle has a clock of its own."""
-    return t[rows].astype(dtype) if isinstance(t, np.ndarray) else float(t)
+def clock(t: Any, rows: Any) -> Any:
+    """The time of each of `rows`, in float64: t itself, or its entries where each particle has a clock of its own."""
+    return t[rows] if isinstance(t, np.ndarray) else float(t)
 
 
 def matrix(values: Sequence[Any], count: int, dtype: Any) -> Array:

@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import ast
 import math
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+import numpy as np
+
 from pointmass.errors import InvalidInput, unknown
 from pointmass.laws import functions as fn
+from pointmass.laws.program import Symbol
 
 FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
     "sin": (fn.sin, 1),
@@ -35,6 +39,7 @@ BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Sub: lambda a, b: a - b,
     ast.Mult: lambda a, b: a * b,
     ast.Div: lambda a, b: a / b,
+    ast.Mod: lambda a, b: a % b,
     ast.Pow: fn.pow,
 }
 COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
@@ -46,6 +51,7 @@ COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.NotEq: lambda a, b: a != b,
 }
 LONGEST = 2000  # characters; a formula is a line, and the parser's stack has an end
+DEEPEST = 100  # operations inside one another
 
 
 class Formula:
@@ -64,15 +70,17 @@ class Formula:
 
     def __init__(self, text: str, names: Iterable[str] | None = None, what: str = "formula") -> None:
         self.text = str(text).strip()
+        self.shown = self.text if len(self.text) <= 60 else f"{self.text[:57]}..."
         self.what = what
         if not self.text or len(self.text) > LONGEST:
             raise InvalidInput(f"{what} must be a formula of 1 to {LONGEST} characters, not {self.text[:20]!r}")
         try:
-            self._tree = ast.parse(self.text, mode="eval").body
+            with warnings.catch_warnings(action="ignore"):  # of the parser, about other uses of the text
+                self._tree = ast.parse(self.text, mode="eval").body
         except (SyntaxError, ValueError, RecursionError, MemoryError):
-            raise InvalidInput(f"{what} {self.text!r} is not a formula; write it like -k*x + sin(t)") from None
+            raise InvalidInput(f"{what} {self.shown!r} is not a formula; write it like -k*x + sin(t)") from None
         self.names: set[str] = set()
-        self._check(self._tree)
+        self._check(self._tree, 0)
         if names is not None:
             self.restrict(names)
 
@@ -80,47 +88,55 @@ class Formula:
         """Refuse a formula that refers to anything else than `names`."""
         known = set(names)
         for name in sorted(self.names - known):
-            raise unknown(f"name in {self.what} {self.text!r}:", name, [*known, *CONSTANTS, *FUNCTIONS])
+            raise unknown(f"name in {self.what} {self.shown!r}:", name, [*known, *CONSTANTS, *FUNCTIONS])
 
     def __call__(self, values: Mapping[str, Any]) -> Any:
         """The value, for numbers, arrays or symbols by name."""
-        return self._value(self._tree, values)
+        with np.errstate(all="ignore"):
+            return self._value(self._tree, values)
 
-    def _check(self, node: ast.expr) -> None:
+    def _check(self, node: ast.expr, depth: int) -> None:
+        if depth > DEEPEST:
+            raise InvalidInput(f"{self.what} nests more than {DEEPEST} operations: split it into several formulas")
+        if isinstance(node, ast.Name) and node.id not in CONSTANTS:
+            self.names.add(node.id)
+        for part in self._parts(node):
+            self._check(part, depth + 1)
+
+    def _parts(self, node: ast.expr) -> list[ast.expr]:
+        """The operands of what a formula may contain; everything else is refused here."""
         match node:
-            case ast.Constant(value=bool()):
-                raise self._refused("True and False")
-            case ast.Constant(value=int() | float()):
-                return
-            case ast.Name(id=name):
-                if name not in CONSTANTS:
-                    self.names.add(name)
+            case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+                self._number(value)
+                return []
+            case ast.Name():
+                return []
             case ast.UnaryOp(op=ast.USub() | ast.UAdd(), operand=inner):
-                self._check(inner)
+                return [inner]
             case ast.BinOp(left=a, op=op, right=b) if type(op) in BINARY:
-                self._check(a)
-                self._check(b)
+                return [a, b]
             case ast.Compare(left=a, ops=[op], comparators=[b]) if type(op) in COMPARE:
-                self._check(a)
-                self._check(b)
+                return [a, b]
             case ast.IfExp(test=c, body=a, orelse=b):
-                for part in (c, a, b):
-                    self._check(part)
+                return [c, a, b]
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
                 if name not in FUNCTIONS:
-                    raise unknown(f"function in {self.what} {self.text!r}:", name, FUNCTIONS)
+                    raise unknown(f"function in {self.what} {self.shown!r}:", name, FUNCTIONS)
                 if len(arguments) != FUNCTIONS[name][1]:
-                    raise InvalidInput(f"{name} in {self.what} {self.text!r} takes {FUNCTIONS[name][1]} argument(s)")
-                for part in arguments:
-                    self._check(part)
-            case _:
-                raise self._refused(type(node).__name__)
-
-    def _refused(self, thing: str) -> InvalidInput:
-        return InvalidInput(
-            f"{self.what} {self.text!r} may use numbers, names, + - * / **, comparisons, `a if c else b` "
-            f"and {', '.join(FUNCTIONS)}, but not {thing}"
+                    raise InvalidInput(f"{name} in {self.what} {self.shown!r} takes {FUNCTIONS[name][1]} argument(s)")
+                return arguments
+        raise InvalidInput(
+            f"{self.what} {self.shown!r} may use numbers, names, + - * / % **, comparisons, `a if c else b` "
+            f"and {', '.join(FUNCTIONS)}, but not {_description(node)}"
         )
+
+    def _number(self, value: float) -> None:
+        try:
+            finite = math.isfinite(float(value))
+        except OverflowError:
+            finite = False
+        if not finite:
+            raise InvalidInput(f"{self.what} {self.shown!r} has a number above 1e308")
 
     def _value(self, node: ast.expr, values: Mapping[str, Any]) -> Any:
         match node:
@@ -133,7 +149,8 @@ class Formula:
             case ast.BinOp(left=a, op=op, right=b):
                 return self._arithmetic(op, self._value(a, values), self._value(b, values))
             case ast.Compare(left=a, ops=[op], comparators=[b]):
-                return COMPARE[type(op)](self._value(a, values), self._value(b, values))
+                holds = COMPARE[type(op)](self._value(a, values), self._value(b, values))
+                return holds if isinstance(holds, Symbol) else fn.where(holds, 1.0, 0.0)
             case ast.IfExp(test=c, body=a, orelse=b):
                 return fn.where(*(self._value(part, values) for part in (c, a, b)))
             case ast.Call(func=ast.Name(id=name), args=arguments):
@@ -144,4 +161,16 @@ class Formula:
         try:
             return BINARY[type(op)](a, b)
         except (ZeroDivisionError, OverflowError):
-            raise InvalidInput(f"{self.what} {self.text!r} divides by zero or overflows") from None
+            raise InvalidInput(f"{self.what} {self.shown!r} divides by zero or overflows") from None
+
+
+def _description(node: ast.expr) -> str:
+    """What is wrong in the words of who wrote it."""
+    match node:
+        case ast.Constant(value=value):
+            return repr(value)
+        case ast.Compare():
+            return "chained comparisons such as a < b < c"
+        case ast.Attribute() | ast.Call():
+            return "anything with a dot, or functions of one's own"
+    return type(node).__name__

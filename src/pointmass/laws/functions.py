@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pointmass.laws.program import Symbol
+from pointmass.laws.program import Symbol, power, whole_power
 
 Number = Any  # a float, an array or a Symbol
 Vector = tuple[Number, Number, Number]
@@ -42,11 +42,10 @@ def operation(name: str, *arguments: Number) -> Number:
             return Symbol(argument.program, argument.program.operation(name, *nodes))
     if name in NUMPY:
         with np.errstate(all="ignore"):
-            return NUMPY[name](*arguments)
-    from pointmass.laws.elementary import EXPANSIONS
+            return np.asarray(NUMPY[name](*arguments))[()]
+    from pointmass.laws.columns import elementary
 
-    with np.errstate(all="ignore"):
-        return EXPANSIONS[name](*(np.asarray(a)[()] for a in arguments))
+    return elementary(name)(*arguments)[0]
 
 
 def sqrt(a: Number) -> Number:
@@ -80,9 +79,11 @@ def log(a: Number) -> Number:
 
 
 def pow(a: Number, b: Number) -> Number:
-    """`a` to the power `b`, for a >= 0; whole `b` given as a number is a product and takes any `a`."""
-    if isinstance(a, Symbol) and not isinstance(b, Symbol):
+    """`a` to the power `b`; NaN where a < 0 and b is not whole. A small whole number `b` is a product."""
+    if isinstance(a, Symbol):
         return a**b
+    if isinstance(b, (int, float)) and whole_power(b):
+        return power(a, b)
     return operation("pow", a, b)
 
 

@@ -49,7 +49,7 @@ class PairForce(Force):
         return bool({"v1", "v2"} & self.traced.depends_on)
 
     def bind(self, particles: Particles) -> None:
-        particles.select(self.on)
+        super().bind(particles)
         for p in self.parameters.values():
             p.check(particles, len(particles), "particles")
             if p.vector or (p.name not in self.per_particle and not p.common):
@@ -67,7 +67,8 @@ class PairForce(Force):
         rows = particles.select(self.on)
         if len(rows) > LARGEST_JACOBIAN:
             raise InvalidInput(
-                f"{self.name} couples {len(rows)} particles: implicit solvers take at most {LARGEST_JACOBIAN}; use leapfrog or dopri5"
+                f"{self.name} couples {len(rows)} particles, and implicit solvers take at most {LARGEST_JACOBIAN}: "
+                "use leapfrog or dopri5"
             )
         n = len(rows)
         parts = self._on_block(self._jacobian, particles, t, x, v, rows, rows)
@@ -134,17 +135,16 @@ class PairForce(Force):
         self, law: Traced, particles: Particles, t: Any, x: Array, v: Array, first: Rows, second: Rows
     ) -> list[Array]:
         """Outputs of a law for all pairs (i, j), each of shape (len(first), len(second)), 0 where i = j."""
-        now = clock(t, first, x.dtype)
         shape = (len(first), len(second))
-        columns: dict[str, Any] = {"t": now[:, None] if isinstance(now, np.ndarray) else now}
-        for node, rows, place in (("1", first, np.s_[:, None]), ("2", second, np.s_[None, :])):
-            columns[f"m{node}"] = particles.m[rows][place]
+        columns: dict[str, Any] = {}
+        for node, rows, place in (("2", second, np.s_[None, :]), ("1", first, np.s_[:, None])):
+            now = clock(t, rows)
+            own = {"t": now, f"m{node}": particles.m[rows]}  # t, and parameters that all share, are those of particle 1
             for p in self.parameters.values():
-                (value,) = p.of(particles, now, rows)
-                name = f"{p.name}{node}" if p.name in self.per_particle else p.name
-                columns[name] = value[place] if isinstance(value, np.ndarray) else value
+                (own[f"{p.name}{node}" if p.name in self.per_particle else p.name],) = p.of(particles, now, rows)
             for q, array in (("x", x), ("v", v)):
-                columns |= {n: c[rows][place] for n, c in zip(vector_names(f"{q}{node}"), array.T, strict=True)}
+                own |= zip(vector_names(f"{q}{node}"), array[rows].T, strict=True)
+            columns |= {n: c[place] if np.ndim(c) else c for n, c in own.items()}
         outputs = law.columns(*inputs_for(law, {}, columns, {}))
         itself = first[:, None] == second[None, :]
         return [np.where(itself, x.dtype.type(0), np.broadcast_to(o, shape)) for o in outputs]

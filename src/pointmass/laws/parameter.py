@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pointmass.errors import InvalidInput, finite_array, number
 from pointmass.laws.formula import Formula
+from pointmass.laws.program import flatten
 from pointmass.laws.trace import Traced, trace
 from pointmass.particles import Particles
 
@@ -25,15 +26,18 @@ class Component:
         self.name = name
         self.value: float | NDArray[np.float64] | Traced
         self.needs: tuple[str, ...] = ()
+        self.formula: Formula | None = None
         if isinstance(value, str):
-            formula = Formula(value, what=name)
+            self.formula = formula = Formula(value, what=name)
             self.needs = tuple(sorted(formula.names - {"t"}))
             names = ("t", *self.needs)
             arguments = dict.fromkeys(names, "scalar")
             self.value = trace(lambda *v: formula(dict(zip(names, v, strict=True))), arguments, 1, name)
+            if not formula.names:
+                self.value = number(name, formula({}), unit=unit, **bounds)
         elif callable(value):
             self.value = trace(value, {"t": "scalar"}, 1, name)
-        elif np.ndim(value) == 1:
+        elif _ndim(value) == 1:
             self.value = finite_array(name, value, (None,))
             for extreme in (self.value.min(), self.value.max()) if self.value.size else ():
                 number(name, extreme, unit=unit, **bounds)
@@ -53,7 +57,7 @@ class Component:
         """d/dt of the component."""
         result = Component(f"d {self.name}/dt", 0.0, {}, "")
         if isinstance(self.value, Traced):
-            result.value, result.needs = self.value.jacobian("t"), self.needs
+            result.value, result.needs, result.formula = self.value.jacobian("t"), self.needs, self.formula
         return result
 
 
@@ -113,9 +117,12 @@ class Parameter:
         """Refuse a column of another length, and attributes that the particles do not have."""
         for c in self.components:
             if isinstance(c.value, np.ndarray) and len(c.value) != count:
-                raise InvalidInput(f"{c.name} has {len(c.value)} values for {count} {what}")
-            if isinstance(c.value, Traced):
-                Formula("+".join(c.needs) or "0", ["t", *particles.columns], what=c.name)
+                raise InvalidInput(
+                    f"{c.name} has {len(c.value)} values for {count} {what}: give one number, one for each, "
+                    "or the name of a particle attribute"
+                )
+            if c.formula is not None:
+                c.formula.restrict(["t", *particles.columns])
 
     def keep(self, mask: NDArray[np.bool_]) -> None:
         """Keep the rows of a mask in columns of numbers."""
@@ -127,16 +134,23 @@ class Parameter:
         if not self.vector:
             return [value]
         if callable(value):
-            return [lambda t, k=k: value(t)[k] for k in range(3)]
-        if not isinstance(value, str) and np.ndim(_numbers(value)) == 2:
+            return [lambda t, k=k: self._part(value(t), k) for k in range(3)]
+        if not isinstance(value, str) and _ndim(value) == 2:
             return list(finite_array(self.name, value, (None, 3)).T)
         if isinstance(value, str) or not hasattr(value, "__len__") or len(value) not in (2, 3):
             raise InvalidInput(f"{self.name} must be three numbers or formulas, not {value!r}")
         return [*value, 0.0][:3]
 
+    def _part(self, vector: Any, axis: int) -> Any:
+        parts = list(flatten(vector))
+        if len(parts) not in (2, 3):
+            raise InvalidInput(f"{self.name} must be a function of t that returns three numbers, not {len(parts)}")
+        return [*parts, 0.0][axis]
 
-def _numbers(value: Any) -> Any:
+
+def _ndim(value: Any) -> int:
+    """Dimensions of an array of numbers; 0 for anything else."""
     try:
-        return np.asarray(value, dtype=float)
+        return np.ndim(np.asarray(value, dtype=float))
     except (TypeError, ValueError):
-        return 0.0
+        return 0

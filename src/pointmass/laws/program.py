@@ -19,14 +19,29 @@ from pointmass.errors import InvalidInput
 
 Node = tuple[Any, ...]  # ("const", value), ("arg", name), ("call", primitive, *nodes) or (operation, *nodes)
 
-FOLD: dict[str, Callable[..., float]] = {
-    "add": operator.add,
-    "sub": operator.sub,
-    "mul": operator.mul,
-    "neg": operator.neg,
-    "abs": abs,
-    "floor": lambda a: float(math.floor(a)),
+FOLD: dict[str, Callable[..., Any]] = {  # an operation on numbers is done while tracing
+    "add": np.add,
+    "sub": np.subtract,
+    "mul": np.multiply,
+    "div": np.divide,
+    "neg": np.negative,
+    "abs": np.abs,
+    "floor": np.floor,
+    "sqrt": np.sqrt,
+    "min": np.minimum,
+    "max": np.maximum,
+    "lt": np.less,
+    "le": np.less_equal,
+    "eq": np.equal,
+    "and": np.logical_and,
+    "or": np.logical_or,
+    "not": np.logical_not,
+    "ldexp": lambda a, k: np.ldexp(a, int(k)),
+    "significand": lambda a: math.frexp(a)[0],
+    "exponent": lambda a: math.frexp(a)[1],
 }
+CONDITIONS = {"lt", "le", "eq", "and", "or", "not"}  # operations whose result is true or false
+JUNCTIONS = {"and", "or", "not"}  # and whose operands are
 
 
 @dataclass(eq=False)
@@ -46,13 +61,33 @@ class Program:
         return self._store(("arg", name))
 
     def operation(self, name: str, *operands: int) -> int:
-        """The node of an operation, simplified where an operand is 0 or 1."""
+        """The node of an operation, simplified where an operand is 0 or 1.
+
+        Conditions and numbers are kept apart: a condition used as a number is 1 or 0, a number used as a condition
+        holds where it is not 0.
+        """
+        operands = tuple(
+            self.condition(o) if name in JUNCTIONS or (name == "where" and k == 0) else self.number(o)
+            for k, o in enumerate(operands)
+        )
         simple = self._simplified(name, operands)
         return self._store((name, *operands)) if simple is None else simple
 
     def call(self, primitive: Primitive, *operands: int) -> int:
         """The node of a registered primitive, such as a look-up in a grid."""
-        return self._store(("call", primitive, *operands))
+        return self._store(("call", primitive, *(self.number(o) for o in operands)))
+
+    def number(self, node: int) -> int:
+        """The node as a number: a condition is 1 where it holds, else 0."""
+        if self.nodes[node][0] not in CONDITIONS:
+            return node
+        return self._store(("where", node, self.constant(1.0), self.constant(0.0)))
+
+    def condition(self, node: int) -> int:
+        """The node as a condition: a number holds where it is not 0."""
+        if self.nodes[node][0] in CONDITIONS or self.value(node) is not None:
+            return node
+        return self.operation("not", self._store(("eq", node, self.constant(0.0))))
 
     def live(self) -> list[int]:
         """The nodes that the outputs need, in order."""
@@ -83,9 +118,13 @@ class Program:
     def _simplified(self, name: str, nodes: Sequence[int]) -> int | None:
         values = [self.value(n) for n in nodes]
         if name in FOLD and all(v is not None for v in values):
-            return self.constant(FOLD[name](*values))
+            with np.errstate(all="ignore"):
+                return self.constant(FOLD[name](*values))
         if name == "where" and (nodes[1] == nodes[2] or values[0] is not None):
             return nodes[1] if values[0] is None or values[0] else nodes[2]
+        if name in ("and", "or") and any(v is not None for v in values):
+            known, other = (values[0], nodes[1]) if values[0] is not None else (values[1], nodes[0])
+            return other if bool(known) == (name == "and") else self.constant(float(name == "or"))
         for unit, ops, other in ((0.0, ("add",), 1), (1.0, ("mul",), 1)):
             if name in ops and unit in values:
                 return nodes[other - values.index(unit)]
@@ -126,29 +165,6 @@ class Primitive:
         raise NotImplementedError
 
 
-UFUNCS = {
-    "add": "add",
-    "subtract": "sub",
-    "multiply": "mul",
-    "divide": "div",
-    "negative": "neg",
-    "sqrt": "sqrt",
-    "absolute": "abs",
-    "fabs": "abs",
-    "floor": "floor",
-    "minimum": "min",
-    "maximum": "max",
-    "less": "lt",
-    "less_equal": "le",
-    "sin": "sin",
-    "cos": "cos",
-    "exp": "exp",
-    "log": "log",
-    "power": "pow",
-    "arctan2": "atan2",
-}
-
-
 class Symbol:
     """A number that is not known yet: what a law sees while it is traced."""
 
@@ -167,10 +183,23 @@ class Symbol:
     def lift(self, value: Any) -> int:
         """The node of a symbol or number."""
         if isinstance(value, Symbol):
+            if value.program is not self.program:
+                raise InvalidInput("a law cannot keep an argument of another law: pass it on as a parameter")
             return value.node
-        if isinstance(value, (int, float, np.number, np.bool_)):
-            return self.program.constant(float(value))
+        if isinstance(value, np.ndarray) and value.ndim == 0:
+            value = value[()]
+        if isinstance(value, (int, float, np.floating, np.integer, np.bool_)):
+            return self.program.constant(_float(value))
+        if isinstance(value, (tuple, list, np.ndarray)):
+            raise InvalidInput(
+                "a law computes with numbers, and a vector is three of them: use pm.scale(k, v), pm.add(a, b) "
+                "or pm.sub(a, b)"
+            )
         raise InvalidInput(f"a law computes with its arguments and numbers, not with {type(value).__name__}")
+
+    def lifted(self, value: Any) -> Symbol:
+        """A symbol or number as a symbol of the same program."""
+        return Symbol(self.program, self.lift(value))
 
     def _flipped(self, name: str, other: Any) -> Symbol:
         return Symbol(self.program, self.program.operation(name, self.lift(other), self.node))
@@ -198,6 +227,18 @@ class Symbol:
 
     def __rtruediv__(self, other: Any) -> Symbol:
         return self._flipped("div", other)
+
+    def __mod__(self, other: Any) -> Symbol:
+        return self - self.lifted(other) * (self // other)
+
+    def __rmod__(self, other: Any) -> Symbol:
+        return self.lifted(other) % self
+
+    def __floordiv__(self, other: Any) -> Symbol:
+        return (self / other).apply("floor")
+
+    def __rfloordiv__(self, other: Any) -> Symbol:
+        return self.lifted(other) // self
 
     def __neg__(self) -> Symbol:
         return self.apply("neg")
@@ -236,16 +277,19 @@ class Symbol:
         return self.apply("not")
 
     def __pow__(self, exponent: Any) -> Symbol:
-        if isinstance(exponent, (int, float, np.number)):
-            return _power(self, float(exponent))
-        return self.apply("pow", exponent)
+        node = self.lift(exponent)
+        known = self.program.value(node)
+        if known is not None and whole_power(known):
+            return self.lifted(power(self, known))
+        return self.apply("sqrt") if known == 0.5 else self.apply("pow", exponent)
 
     def __rpow__(self, base: Any) -> Symbol:
         return self._flipped("pow", base)
 
     def __bool__(self) -> bool:
         raise InvalidInput(
-            "a law cannot branch with `if`, `and`, `or` or `not`: use pm.where(condition, a, b), & and |"
+            "a law cannot branch with `if`, `and`, `or`, `not`, min or max: use pm.where(condition, a, b), &, |, ~, "
+            "pm.minimum and pm.maximum"
         )
 
     def __iter__(self) -> Iterator[Symbol]:
@@ -253,36 +297,82 @@ class Symbol:
 
     def __float__(self) -> float:
         raise InvalidInput(
-            "a law cannot turn its arguments into floats: use pm.sin, pm.exp, ... instead of math.sin, ..."
+            "a law cannot turn its arguments into floats: use pm.sin, pm.exp, pm.length, ... instead of math.sin, "
+            "math.exp, np.linalg.norm, ..."
         )
 
     __int__ = __index__ = __float__  # type: ignore[assignment]
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Symbol:
         """np.sqrt(x) and its like work on symbols too."""
-        name = UFUNCS.get(ufunc.__name__)
-        if name is None or method != "__call__" or options:
+        function = UFUNCS.get(ufunc.__name__)
+        if function is None or method != "__call__" or options:
             raise InvalidInput(f"a law cannot use np.{ufunc.__name__}: known are {', '.join(sorted(UFUNCS))}")
-        return Symbol(self.program, self.program.operation(name, *(self.lift(i) for i in inputs)))
+        return function(*(self.lifted(i) for i in inputs))
 
 
-def _power(base: Symbol, exponent: float) -> Symbol:
-    if exponent == 0.5:
-        return base.apply("sqrt")
-    if exponent != int(exponent) or abs(exponent) > 64:
-        return base.apply("pow", exponent)
+UFUNCS: dict[str, Callable[..., Symbol]] = {
+    "add": operator.add,
+    "subtract": operator.sub,
+    "multiply": operator.mul,
+    "divide": operator.truediv,
+    "remainder": operator.mod,
+    "floor_divide": operator.floordiv,
+    "power": operator.pow,
+    "float_power": operator.pow,
+    "square": lambda a: a * a,
+    "negative": operator.neg,
+    "positive": operator.pos,
+    "absolute": abs,
+    "fabs": abs,
+    "less": operator.lt,
+    "less_equal": operator.le,
+    "greater": operator.gt,
+    "greater_equal": operator.ge,
+    "equal": operator.eq,
+    "not_equal": operator.ne,
+    "logical_and": operator.and_,
+    "logical_or": operator.or_,
+    "logical_not": operator.invert,
+    "sqrt": lambda a: a.apply("sqrt"),
+    "floor": lambda a: a.apply("floor"),
+    "minimum": lambda a, b: a.apply("min", b),
+    "maximum": lambda a, b: a.apply("max", b),
+    "sin": lambda a: a.apply("sin"),
+    "cos": lambda a: a.apply("cos"),
+    "tan": lambda a: a.apply("sin") / a.apply("cos"),
+    "exp": lambda a: a.apply("exp"),
+    "log": lambda a: a.apply("log"),
+    "arctan2": lambda y, x: y.apply("atan2", x),
+}
+
+
+def whole_power(exponent: float) -> bool:
+    """Whether a power is written as a product, which takes a base of any sign."""
+    return math.isfinite(exponent) and exponent == int(exponent) and abs(exponent) <= 64
+
+
+def power(base: Any, exponent: float) -> Any:
+    """`base`, a symbol, number or array, to a whole power: a product of squares."""
     if exponent < 0:
-        return 1.0 / _power(base, -exponent)
-    if exponent == 0:
-        return Symbol(base.program, base.program.constant(1.0))
-    half = _power(base, float(int(exponent) // 2))
-    return (half * half * base if int(exponent) % 2 else half * half) if exponent > 1 else base
+        return 1.0 / power(base, -exponent)
+    if exponent < 2:
+        return base if exponent == 1 else 0.0 * base + 1.0
+    half = power(base, exponent // 2)
+    return half * half * base if exponent % 2 else half * half
 
 
 def flatten(value: Any) -> Iterable[Any]:
     """The numbers in nested tuples, in order."""
-    if isinstance(value, (tuple, list)):
+    if isinstance(value, (tuple, list)) or (isinstance(value, np.ndarray) and value.ndim):
         for item in value:
             yield from flatten(item)
     else:
         yield value
+
+
+def _float(value: Any) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        raise InvalidInput(f"a law computes with numbers below 1e308, not with {str(value)[:20]}...") from None

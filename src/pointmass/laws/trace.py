@@ -34,6 +34,9 @@ class Traced:
         self.inputs = inputs
         self.program = program
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {k: v for k, v in self.__dict__.items() if k != "columns"}  # compiled again where it is needed
+
     @cached_property
     def columns(self) -> Callable[..., tuple[Any, ...]]:
         """The law on whole columns, one array per input, one per output."""
@@ -56,7 +59,7 @@ def trace(
 
     Parameters
     ----------
-    law : takes the arguments in order, scalars as numbers and vectors as tuples of three, and returns numbers or tuples.
+    law : takes the arguments in order, scalars as numbers and vectors as tuples of three; returns numbers or tuples.
     arguments : name -> "scalar" or "vector".
     returns : how many numbers the law must return in all; None = any.
     name : for messages.
@@ -66,7 +69,7 @@ def trace(
     InvalidInput
         The law cannot be turned into a straight-line program; the sentence says why and what to write instead.
     """
-    name = name or getattr(law, "__name__", type(law).__name__)
+    name = name or str(getattr(law, "__name__", type(law).__name__))
     program = Program()
     inputs: list[str] = []
     values: list[Any] = []
@@ -75,12 +78,17 @@ def trace(
         inputs.extend(names)
         symbols = tuple(Symbol(program, program.argument(n)) for n in names)
         values.append(symbols if kind == "vector" else symbols[0])
+    if len(set(inputs)) != len(inputs):
+        twice = next(n for n in inputs if inputs.count(n) > 1)
+        raise InvalidInput(f"law {name!r} has two inputs of the name {twice!r}: rename one of its parameters")
     try:
         result = law(*values)
     except InvalidInput as error:
         raise InvalidInput(f"law {name!r}: {error}") from error
     except Exception as error:
         raise InvalidInput(f"law {name!r} failed on symbols: {type(error).__name__}: {error}") from error
+    if result is None:
+        raise InvalidInput(f"law {name!r} must return numbers, but returned nothing: does it end with `return`?")
     numbers = list(flatten(result))
     if returns is not None and len(numbers) != returns:
         raise InvalidInput(
@@ -88,7 +96,7 @@ def trace(
         )
     anchor = Symbol(program, program.constant(0.0))
     try:
-        program.outputs = [anchor.lift(n) for n in numbers]
+        program.outputs = [program.number(anchor.lift(n)) for n in numbers]
     except InvalidInput as error:
         raise InvalidInput(f"law {name!r} must return numbers: {error}") from error
     return Traced(name, tuple(inputs), program)

@@ -46,7 +46,7 @@ class UnaryForce(Force):
         return "v" in self.traced.depends_on
 
     def bind(self, particles: Particles) -> None:
-        particles.select(self.on)
+        super().bind(particles)
         for p in self.parameters.values():
             p.check(particles, len(particles), "particles")
         _ = self.traced
@@ -89,7 +89,7 @@ class UnaryForce(Force):
         return {name: kinds[name] for name in self.reads} | own
 
     def _inputs(self, law: Traced, particles: Particles, t: Any, x: Array, v: Array, rows: Any) -> list[Any]:
-        now = clock(t, rows, x.dtype)
+        now = clock(t, rows)
         parameters = {p.name: p.of(particles, now, rows) for p in self.parameters.values()}
         return inputs_for(law, {"x": x[rows], "v": v[rows]}, {"m": particles.m[rows], "t": now}, parameters)
 
@@ -115,6 +115,11 @@ def unary_force(law: Callable[..., Any]) -> type[UnaryForce]:
         A class of forces; its constructor takes the law's parameters by name (a tuple default makes a vector), and
         `on` and `enabled`.
 
+    Notes
+    -----
+    Variables of the surrounding program are read once, when the force is first used; what should change later is a
+    parameter (`force.set`).
+
     Examples
     --------
     >>> @pm.unary_force
@@ -132,13 +137,26 @@ def velocity_field(law: Callable[..., Any]) -> type[VelocityField]:
 
 def law_parameters(law: Callable[..., Any], fixed: Sequence[str]) -> dict[str, Any]:
     """Names of a law's own parameters -> their defaults; the first names must be `fixed`."""
-    names = inspect.signature(law).parameters
-    first = list(names)[: len(fixed)]
-    if len(first) < len(fixed):
+    try:
+        names = inspect.signature(law).parameters
+    except (TypeError, ValueError):
+        raise InvalidInput(f"a law must be a function written in Python, not {law!r}") from None
+    first, own = list(names)[: len(fixed)], list(names)[len(fixed) :]
+    named = all(p.kind in (p.POSITIONAL_OR_KEYWORD, p.POSITIONAL_ONLY, p.KEYWORD_ONLY) for p in names.values())
+    swapped = any(n in fixed and fixed[k] != n for k, n in enumerate(first)) or any(n in fixed for n in own)
+    if len(first) < len(fixed) or swapped or not named:
         raise InvalidInput(
-            f"law {law.__name__!r} must take ({', '.join(fixed)}, *parameters), not ({', '.join(names)})"
+            f"law {law_name(law)!r} must take ({', '.join(fixed)}, *parameters), each parameter by a name of its own, "
+            f"not ({', '.join(map(str, names.values()))})"
         )
-    return {n: names[n].default for n in list(names)[len(fixed) :]}
+    for taken in {"on", "enabled", "pairs", "elements"} & set(own):
+        raise InvalidInput(f"law {law_name(law)!r} cannot have a parameter {taken!r}: every force has that; rename it")
+    return {n: names[n].default for n in own}
+
+
+def law_name(law: Callable[..., Any]) -> str:
+    """Name of a user's law, for messages and for the class that is made of it."""
+    return getattr(law, "__name__", type(law).__name__)
 
 
 def parameters_from(law: Callable[..., Any], own: dict[str, Any], given: dict[str, Any]) -> list[Parameter]:
@@ -147,13 +165,18 @@ def parameters_from(law: Callable[..., Any], own: dict[str, Any], given: dict[st
     missing = [n for n, v in values.items() if v is inspect.Parameter.empty]
     if missing or given:
         problem = f"needs {', '.join(missing)}" if missing else f"has no parameter {', '.join(given)}"
-        raise InvalidInput(f"law {law.__name__!r} {problem}: its parameters are {', '.join(own) or 'none'}")
-    return [Parameter(n, v, vector=_is_vector(own[n], v)) for n, v in values.items()]
+        raise InvalidInput(f"law {law_name(law)!r} {problem}: its parameters are {', '.join(own) or 'none'}")
+    return [Parameter(n, v, vector=_is_vector(n, own[n], v)) for n, v in values.items()]
 
 
-def _is_vector(default: Any, value: Any) -> bool:
+def _is_vector(name: str, default: Any, value: Any) -> bool:
+    """Whether a parameter is a vector: its default says so, and without a default the value does."""
     sample = value if default is inspect.Parameter.empty else default
-    return isinstance(sample, tuple) and len(sample) == 3
+    if callable(sample):
+        return len(trace(sample, {"t": "scalar"}, None, name).program.outputs) > 1
+    if isinstance(sample, np.ndarray):
+        return sample.ndim == 2 or (sample is default and sample.shape in ((2,), (3,)))
+    return isinstance(sample, (tuple, list)) and len(sample) in (2, 3)
 
 
 def _class_of(law: Callable[..., Any], base: type[Any], fixed: tuple[str, ...]) -> type[Any]:
@@ -162,5 +185,9 @@ def _class_of(law: Callable[..., Any], base: type[Any], fixed: tuple[str, ...]) 
     def __init__(self: Any, *, on: Selection = None, enabled: bool = True, **parameters: Any) -> None:
         base.__init__(self, parameters_from(law, own, dict(parameters)), on=on, enabled=enabled)
 
-    body = {"__init__": __init__, "law": staticmethod(law), "__doc__": law.__doc__, "__module__": law.__module__}
-    return type(law.__name__, (base,), body)
+    return type(law_name(law), (base,), {"__init__": __init__, "law": staticmethod(law), **origin(law)})
+
+
+def origin(law: Callable[..., Any]) -> dict[str, Any]:
+    """What a class keeps of the function that it is made of."""
+    return {"__doc__": law.__doc__, "__module__": law.__module__, "name": law_name(law)}

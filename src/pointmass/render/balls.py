@@ -12,8 +12,8 @@ from pointmass.render.camera import View
 from pointmass.render.tables import F64, OPAQUE, Table, colors, column, corners, named, pixel_box
 
 COLUMNS = 9
-HALO = 2.5  # a glow ends at this many radii
-MIN_GLOW = 1.5  # and is never narrower than this [pixels]: it fades instead
+HALO = 3.2  # a glow ends at this many radii
+MIN_GLOW = 2.2  # and is never narrower than this [pixels]: it fades instead
 MIN_BALL = 0.7  # the same for a ball
 SOLID = 1.5  # a ball whose radius is less is laid over with a soft edge [pixels]
 

@@ -47,8 +47,9 @@ class Video:
         import av
 
         container_options = {"movflags": "+faststart"} if path.suffix == ".mp4" else {}
-        self._container: Any = av.open(str(path), "w", options=container_options)
-        self._stream: Any = self._container.add_stream(codec, rate=fps, options=options)
+        container: Any = av.open(str(path), "w", options=container_options)
+        self._container = container
+        self._stream: Any = container.add_stream(codec, rate=fps, options=options)
         self._stream.width, self._stream.height = (side + side % 2 for side in size)
         self._stream.pix_fmt = "yuv420p"
         # Without these tags players guess, and guess wrong by up to 40 of 255.
@@ -94,7 +95,7 @@ class Gif:
     def _start(self) -> None:
         from av.filter import Graph
 
-        graph = Graph()
+        graph: Any = Graph()
         width, height = self._size
         source = graph.add_buffer(width=width, height=height, format="rgb24", time_base=1 / self._fps)
         split, palette = graph.add("split"), graph.add("palettegen", "stats_mode=diff")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +21,14 @@ from pointmass.render.meshes import EMPTY as NO_FACES
 from pointmass.render.meshes import triangles
 from pointmass.render.shadow import Casters, casters, no_shadow, shadow
 from pointmass.render.style import Style
-from pointmass.render.tables import F32, Mask, Table, join, visible
+from pointmass.render.tables import F32, F64, Mask, Table, join, visible
 
 Image = NDArray[np.uint8]
 Ints = NDArray[np.int64]
 
 LARGEST = 8192  # pixels along a side
 ROWS = 64  # rows that one thread develops at a time
-SPREAD = 0.62  # how much weaker the bloom's wider blurs are
+SPREAD = 0.7  # how much weaker the bloom's wider blurs are
 
 
 def image(
@@ -100,7 +99,7 @@ def _light(frame: Frame, camera: Camera, view: View, style: Style) -> tuple[F32,
     middle = np.array((view.focal, 0.5 * width, 0.5 * height), dtype=np.float32)
     layered = bool((~faces.solid).any())
     things = [part for table in (faces, round_ones, lines) for part in (table.rows, table.box)]
-    lamp_ = lamp(style, view, camera.up, map_)
+    lamp_ = lamp(style, view, camera, map_)
 
     def band(i: int) -> None:
         top, bottom = i * kernels.BAND, min((i + 1) * kernels.BAND, height)
@@ -175,7 +174,7 @@ def _develop(light: F32, spill: F32, style: Style) -> Image:
     """Bloom, tone map, sRGB."""
     from pointmass.render import kernels_post
 
-    levels = max(1, round(np.log2(max(light.shape[0], 2) / 24.0)))
+    levels = max(1, round(np.log2(max(light.shape[0], 2) / 16.0)))
     if style.bloom > 0.0:
         kernels_post.bloom(spill, levels, np.float32(SPREAD))
     picture = np.empty(light.shape, dtype=np.uint8)
@@ -200,7 +199,8 @@ def _gradient(style: Style, height: int) -> F32:
     share = ((np.arange(height) + 0.5) / height)[:, None]
     # Eased, so that neither end shows an edge.
     share = share * share * (3.0 - 2.0 * share)
-    return ((1.0 - share) * np.asarray(style.top) + share * np.asarray(style.bottom)).astype(np.float32)
+    colors: F64 = (1.0 - share) * np.asarray(style.top) + share * np.asarray(style.bottom)
+    return colors.astype(np.float32)
 
 
 @lru_cache(maxsize=4)
@@ -216,14 +216,16 @@ def _offsets(samples: int) -> F32:
 def _srgb_curve() -> F32:
     """sRGB bytes (not rounded) of linear light, at equal steps of its square root."""
     light = np.linspace(0.0, 1.0, 4096) ** 2
-    curve: Any = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1.0 / 2.4) - 0.055)
-    return (255.0 * curve).astype(np.float32)
+    curve: F64 = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1.0 / 2.4) - 0.055)
+    result: F32 = (255.0 * curve).astype(np.float32)
+    return result
 
 
 @lru_cache(maxsize=1)
 def _dither() -> F32:
     """Bayer's 8 x 8 thresholds in (0, 1): added before the cut to bytes, they hide the steps of dark gradients."""
-    pattern = np.zeros((1, 1))
+    pattern: F64 = np.zeros((1, 1))
     for _ in range(3):
         pattern = np.block([[4 * pattern, 4 * pattern + 2], [4 * pattern + 3, 4 * pattern + 1]])
-    return ((pattern + 0.5) / 64.0).astype(np.float32)
+    result: F32 = ((pattern + 0.5) / 64.0).astype(np.float32)
+    return result

@@ -5,7 +5,13 @@ it (near ones first, with a z-buffer of several samples for each pixel), then la
 first. No two threads write the same row and every row adds in the same order, so the bytes do not depend on threads.
 
 Depths are compared as w = 1/z, which is linear in the picture; 0 is infinitely far.
+
+`light` (RGB) and `depth` of a band are flat: a view of an array costs more than a pixel. `shape` says how they are
+cut: pixels in a row, layers of light in each pixel, samples of depth in each pixel.
 """
+
+# Numba infers the types of kernels.
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator, no-any-return, call-arg"
 
 import math
 
@@ -37,6 +43,7 @@ GLOSS_LINE = np.float32(0.12)
 GLOSS_MESH = np.float32(0.06)
 WRAP = np.float32(0.12)  # how far the key light reaches round an edge
 FALLOFF = np.float32(0.55)  # how much darker a ball or line is where it turns away
+SKIRT = np.float32(0.15)  # strength of a glow's halo
 KNEE = np.float32(1.0)  # light above this spills
 HOTTEST = np.float32(24.0)  # and no more than this, or one spark would fill the picture
 
@@ -103,49 +110,57 @@ def _shade(x, y, z, nx, ny, nz, r, g, b, gloss, lamp, shadow, matrix):
     high = HALF + HALF * (nx * lamp[3] + ny * lamp[4] + nz * lamp[5])
     rim = (ONE - facing) * (ONE - facing)
     rim *= rim * lamp[15] * high
+    # The light is a pool around the target; beyond it all sinks into the colour of the background.
+    x, y, z = x * lamp[17], y * lamp[17], (z - lamp[18]) * lamp[17]
+    far = x * x + y * y + z * z
+    pool = ONE / (ONE + far * far)
+    dim = ONE - pool
     return (
-        r * (key * lamp[6] + lamp[12] + high * (lamp[9] - lamp[12])) + shine * lamp[6] + rim * lamp[9],
-        g * (key * lamp[7] + lamp[13] + high * (lamp[10] - lamp[13])) + shine * lamp[7] + rim * lamp[10],
-        b * (key * lamp[8] + lamp[14] + high * (lamp[11] - lamp[14])) + shine * lamp[8] + rim * lamp[11],
+        pool * (r * (key * lamp[6] + lamp[12] + high * (lamp[9] - lamp[12])) + shine * lamp[6] + rim * lamp[9])
+        + dim * lamp[19],
+        pool * (g * (key * lamp[7] + lamp[13] + high * (lamp[10] - lamp[13])) + shine * lamp[7] + rim * lamp[10])
+        + dim * lamp[20],
+        pool * (b * (key * lamp[8] + lamp[14] + high * (lamp[11] - lamp[14])) + shine * lamp[8] + rim * lamp[11])
+        + dim * lamp[21],
     )
 
 
 @inner
-def _seen(cell, layer, layers, w, sharp):
-    """Share of a layer's samples that lie behind w; it fades over the thickness that `sharp` stands for."""
-    samples = cell.shape[0]
-    first, last = (0, samples) if layers == 1 else (layer, layer + 1)
+def _seen(depth, first, last, w, sharp):
+    """Share of the samples [first, last) that lie behind w; it fades over the thickness that `sharp` stands for."""
     total = ZERO
     for k in range(first, last):
-        total += _clamp((w - cell[k]) * sharp + ONE, ZERO, ONE)
+        total += _clamp((w - depth[k]) * sharp + ONE, ZERO, ONE)
     return total / np.float32(last - first)
 
 
 @inner
-def _lay(light, depth, solid, row, column, w, sharp, r, g, b, alpha):
+def _lay(light, depth, solid, pixel, shape, w, sharp, r, g, b, alpha):
     """Lay premultiplied light with an alpha (0: it only adds) over every layer of a pixel, where it is in front."""
-    pixel, cell = light[row, column], depth[row, column]
-    layers = pixel.shape[0]
+    layers, samples = shape[1], shape[2]
     for k in range(layers):
-        share = _seen(cell, k, layers, w, sharp) if solid else ONE
+        at = pixel * layers + k
+        share = ONE
+        if solid:
+            first = pixel * samples if layers == 1 else at
+            share = _seen(depth, first, first + samples if layers == 1 else first + 1, w, sharp)
         if share > ZERO:
             keep = ONE - alpha * share
-            sample = pixel[k]
-            sample[0] = keep * sample[0] + share * r
-            sample[1] = keep * sample[1] + share * g
-            sample[2] = keep * sample[2] + share * b
+            light[3 * at] = keep * light[3 * at] + share * r
+            light[3 * at + 1] = keep * light[3 * at + 1] + share * g
+            light[3 * at + 2] = keep * light[3 * at + 2] + share * b
 
 
 @inner
-def _write(pixel, mask, alpha, r, g, b):
+def _write(light, first, samples, mask, alpha, r, g, b):
     """Lay a colour over the samples of a pixel that the mask names."""
     keep = ONE - alpha
-    for k in range(pixel.shape[0]):
+    for k in range(samples):
         if mask & (1 << k):
-            sample = pixel[k]
-            sample[0] = keep * sample[0] + alpha * r
-            sample[1] = keep * sample[1] + alpha * g
-            sample[2] = keep * sample[2] + alpha * b
+            at = 3 * (first + k)
+            light[at] = keep * light[at] + alpha * r
+            light[at + 1] = keep * light[at + 1] + alpha * g
+            light[at + 2] = keep * light[at + 2] + alpha * b
 
 
 @inner
@@ -161,7 +176,7 @@ def _narrow(slope, rest, x0, x1):
 
 
 @inner
-def _face(t, box, top, bottom, solid, light, depth, camera, offsets, lamp, shadow, matrix):
+def _face(t, box, top, bottom, solid, light, depth, shape, camera, offsets, lamp, shadow, matrix):
     """One triangle: each sample in front is replaced (solid) or laid over."""
     ax, ay = np.float64(t[0]), np.float64(t[1])
     bx, by, cx, cy = t[2] - ax, t[3] - ay, t[4] - ax, t[5] - ay
@@ -173,7 +188,7 @@ def _face(t, box, top, bottom, solid, light, depth, camera, offsets, lamp, shado
     ux, uy = -vx - wx, -vy - wy
     # Corners turn counter-clockwise seen from outside, and pixels count downwards.
     side = ONE if area < 0.0 else -ONE
-    samples = offsets.shape[0]
+    samples = shape[2]
     for row in range(max(box[2], top), min(box[3], bottom)):
         y = row - ay
         x0, x1 = np.int64(box[0]), np.int64(box[1])
@@ -183,15 +198,15 @@ def _face(t, box, top, bottom, solid, light, depth, camera, offsets, lamp, shado
         for column in range(x0, x1):
             hits, sx, sy = 0, 0.0, 0.0
             mask = 0
-            cell = depth[row - top, column]
+            first = ((row - top) * shape[0] + column) * samples
             for k in range(samples):
                 px, py = column + offsets[k, 0] - ax, row + offsets[k, 1] - ay
                 v, w = vx * px + vy * py, wx * px + wy * py
                 if v >= 0.0 and w >= 0.0 and v + w <= 1.0:
                     near = np.float32((1.0 - v - w) * t[6] + v * t[7] + w * t[8])
-                    if near > cell[k]:
+                    if near > depth[first + k]:
                         if solid:
-                            cell[k] = near
+                            depth[first + k] = near
                         mask |= 1 << k
                         hits += 1
                         sx += px
@@ -218,7 +233,7 @@ def _face(t, box, top, bottom, solid, light, depth, camera, offsets, lamp, shado
                 GLOSS_MESH, lamp, shadow, matrix,
             )  # fmt: skip
             alpha = ONE if solid else _clamp(u * t[21] + v * t[25] + w * t[29], ZERO, ONE)
-            _write(light[row - top, column], mask, alpha, r, g, b)
+            _write(light, first, samples, mask, alpha, r, g, b)
 
 
 @inner
@@ -246,20 +261,21 @@ def _ball_color(c, dx, dy, lamp, shadow, matrix):
 
 
 @inner
-def _ball_solid(c, box, top, bottom, light, depth, camera, offsets, lamp, shadow, matrix):
+def _ball_solid(c, box, top, bottom, light, depth, shape, camera, offsets, lamp, shadow, matrix):
+    samples = shape[2]
     for row in range(max(box[2], top), min(box[3], bottom)):
         for column in range(box[0], box[1]):
             hits, sx, sy = 0, ZERO, ZERO
             mask = 0
-            cell = depth[row - top, column]
-            for k in range(offsets.shape[0]):
+            first = ((row - top) * shape[0] + column) * samples
+            for k in range(samples):
                 dx, dy = _ray(np.float32(column) + offsets[k, 0], np.float32(row) + offsets[k, 1], camera)
                 along, px, py, pz, square = _closest(c, dx, dy)
                 rest = c[3] * c[3] - px * px - py * py - pz * pz
                 if rest > ZERO:
                     near = ONE / (along - math.sqrt(rest / square))
-                    if near > cell[k]:
-                        cell[k] = near
+                    if near > depth[first + k]:
+                        depth[first + k] = near
                         mask |= 1 << k
                         hits += 1
                         sx += dx
@@ -268,11 +284,11 @@ def _ball_solid(c, box, top, bottom, light, depth, camera, offsets, lamp, shadow
                 continue
             share = ONE / np.float32(hits)
             r, g, b = _ball_color(c, sx * share, sy * share, lamp, shadow, matrix)
-            _write(light[row - top, column], mask, ONE, r, g, b)
+            _write(light, first, samples, mask, ONE, r, g, b)
 
 
 @inner
-def _ball_soft(c, box, top, bottom, solid, light, depth, camera, lamp, shadow, matrix):
+def _ball_soft(c, box, top, bottom, solid, light, depth, shape, camera, lamp, shadow, matrix):
     """A ball that is small or lets light through: coverage from the distance to its edge."""
     w = ONE / c[2]
     scale = camera[0] * w
@@ -287,12 +303,13 @@ def _ball_soft(c, box, top, bottom, solid, light, depth, camera, lamp, shadow, m
             alpha = strength * _clamp(shown + HALF - scale * math.sqrt(px * px + py * py + pz * pz), ZERO, ONE)
             if alpha > ZERO:
                 r, g, b = _ball_color(c, dx, dy, lamp, shadow, matrix)
-                _lay(light, depth, solid, row - top, column, w, sharp, alpha * r, alpha * g, alpha * b, alpha)
+                pixel = (row - top) * shape[0] + column
+                _lay(light, depth, solid, pixel, shape, w, sharp, alpha * r, alpha * g, alpha * b, alpha)
 
 
 @inner
-def _ball_glow(c, box, top, bottom, solid, light, depth, camera):
-    """Light that falls as (1 - d^2)^3, close to a Gaussian, but with an end."""
+def _ball_glow(c, box, top, bottom, solid, light, depth, shape, camera):
+    """A bright core in a faint halo: with u = 1 - d^2, u^3 (u^6 + 0.15) is close to two Gaussians, but has an end."""
     w = ONE / c[2]
     full = HALO * camera[0] * w * c[3]
     reach = max(full, MIN_GLOW)
@@ -306,8 +323,10 @@ def _ball_glow(c, box, top, bottom, solid, light, depth, camera):
             ex = np.float32(column) + HALF - x
             rest = ONE - (ex * ex + ey * ey) * inverse
             if rest > ZERO:
-                f = strength * rest * rest * rest
-                _lay(light, depth, solid, row - top, column, w, sharp, f * c[4], f * c[5], f * c[6], ZERO)
+                cube = rest * rest * rest
+                f = strength * cube * (cube * cube + SKIRT)
+                pixel = (row - top) * shape[0] + column
+                _lay(light, depth, solid, pixel, shape, w, sharp, f * c[4], f * c[5], f * c[6], ZERO)
 
 
 @inner
@@ -350,16 +369,17 @@ def _capsule_color(c, t, left, radius, z, px, py, camera, lamp, shadow, matrix):
 
 
 @inner
-def _capsule_solid(c, box, top, bottom, light, depth, camera, offsets, lamp, shadow, matrix):
+def _capsule_solid(c, box, top, bottom, light, depth, shape, camera, offsets, lamp, shadow, matrix):
     wa, wb = ONE / c[2], ONE / c[5]
     ra, rb = camera[0] * c[6] * wa, camera[0] * c[7] * wb
+    samples = shape[2]
     for row in range(max(box[2], top), min(box[3], bottom)):
         x0, x1 = _capsule_span(c, np.float32(row) + HALF, max(ra, rb) + ONE, box)
         for column in range(x0, x1):
             hits, sx, sy = 0, ZERO, ZERO
             mask = 0
-            cell = depth[row - top, column]
-            for k in range(offsets.shape[0]):
+            first = ((row - top) * shape[0] + column) * samples
+            for k in range(samples):
                 px, py = np.float32(column) + offsets[k, 0], np.float32(row) + offsets[k, 1]
                 t, off, _ = _across(c, ra, rb, px, py)
                 radius = ra + t * (rb - ra)
@@ -368,8 +388,8 @@ def _capsule_solid(c, box, top, bottom, light, depth, camera, offsets, lamp, sha
                     s = off / radius
                     # The surface bulges towards the eye by a part of the radius.
                     near = w / (ONE - math.sqrt(ONE - s * s) * min(radius / camera[0], HALF))
-                    if near > cell[k]:
-                        cell[k] = near
+                    if near > depth[first + k]:
+                        depth[first + k] = near
                         mask |= 1 << k
                         hits += 1
                         sx += px
@@ -382,7 +402,7 @@ def _capsule_solid(c, box, top, bottom, light, depth, camera, offsets, lamp, sha
             r, g, b = _capsule_color(
                 c, t, left, ra + t * (rb - ra), z, sx, sy, camera, lamp, shadow, matrix
             )
-            _write(light[row - top, column], mask, ONE, r, g, b)
+            _write(light, first, samples, mask, ONE, r, g, b)
 
 
 @inner
@@ -399,7 +419,7 @@ def _capsule_span(c, y, reach, box):
 
 
 @inner
-def _capsule_soft(c, box, top, bottom, solid, light, depth, camera, lamp, shadow, matrix):
+def _capsule_soft(c, box, top, bottom, solid, light, depth, shape, camera, lamp, shadow, matrix):
     """A thin, clear or glowing line; thinner than a pixel it fades instead."""
     glow = c[24] > ZERO
     wa, wb = ONE / c[2], ONE / c[5]
@@ -425,38 +445,43 @@ def _capsule_soft(c, box, top, bottom, solid, light, depth, camera, lamp, shadow
                 if rest > ZERO:
                     f = alpha * full / reach * rest * rest * rest
                     r, g, b = c[12] + t * (c[16] - c[12]), c[13] + t * (c[17] - c[13]), c[14] + t * (c[18] - c[14])
-                    _lay(light, depth, solid, row - top, column, w, sharp, f * r, f * g, f * b, ZERO)
+                    pixel = (row - top) * shape[0] + column
+                    _lay(light, depth, solid, pixel, shape, w, sharp, f * r, f * g, f * b, ZERO)
             else:
                 shown = max(radius, HALF)
                 alpha *= radius / shown * _clamp(shown + HALF - off, ZERO, ONE)
                 if alpha > ZERO:
                     r, g, b = _capsule_color(c, t, left, radius, z, px, py, camera, lamp, shadow, matrix)
-                    _lay(light, depth, solid, row - top, column, w, sharp, alpha * r, alpha * g, alpha * b, alpha)
+                    pixel = (row - top) * shape[0] + column
+                    _lay(light, depth, solid, pixel, shape, w, sharp, alpha * r, alpha * g, alpha * b, alpha)
 
 
 @inner
-def _mean(layers, picture):
+def _mean(light, layers, picture):
     """The mean of all layers, into (rows, columns, 3)."""
-    count = layers.shape[2]
-    share = ONE / np.float32(count)
-    for row in range(layers.shape[0]):
-        for column in range(layers.shape[1]):
+    share = ONE / np.float32(layers)
+    at = 0
+    for row in range(picture.shape[0]):
+        for column in range(picture.shape[1]):
             r, g, b = ZERO, ZERO, ZERO
-            for k in range(count):
-                r += layers[row, column, k, 0]
-                g += layers[row, column, k, 1]
-                b += layers[row, column, k, 2]
+            for _ in range(layers):
+                r += light[at]
+                g += light[at + 1]
+                b += light[at + 2]
+                at += 3
             picture[row, column, 0] = r * share
             picture[row, column, 1] = g * share
             picture[row, column, 2] = b * share
 
 
 @inner
-def _copy(picture, layers):
+def _copy(picture, light):
+    at = 0
     for row in range(picture.shape[0]):
         for column in range(picture.shape[1]):
             for channel in range(3):
-                layers[row, column, 0, channel] = picture[row, column, channel]
+                light[at] = picture[row, column, channel]
+                at += 1
 
 
 @inner
@@ -481,12 +506,13 @@ def _spill(picture, bright):
 
 
 @inner
-def _background(layers, colors):
-    for row in range(layers.shape[0]):
-        for column in range(layers.shape[1]):
-            for k in range(layers.shape[2]):
-                for channel in range(3):
-                    layers[row, column, k, channel] = colors[row, channel]
+def _background(light, per_row, colors):
+    at = 0
+    for row in range(colors.shape[0]):
+        for _ in range(per_row):
+            for channel in range(3):
+                light[at] = colors[row, channel]
+                at += 1
 
 
 @njit(cache=True, error_model="numpy")
@@ -537,40 +563,42 @@ def draw(
     bottom = top + picture.shape[0]
     rows, width = picture.shape[0], picture.shape[1]
     many = len(solids) > 0 or layered
-    light = np.empty((rows, width, offsets.shape[0] if many else 1, 3), dtype=np.float32)
-    depth = np.zeros((rows, width, light.shape[2]), dtype=np.float32)
-    _background(light, background)
+    samples = offsets.shape[0] if many else 1
+    light = np.empty(rows * width * samples * 3, dtype=np.float32)
+    depth = np.zeros(rows * width * samples, dtype=np.float32)
+    _background(light, width * samples, background)
+    shape = (width, samples, samples)
     capsule_first = len(faces) + len(balls)
     solid = len(solids) > 0
     for phase in range(2):
         first = phase == 0
         if many and not layered and not first:
             # Nothing that follows needs the samples one by one.
-            _mean(light, picture)
-            light = np.empty((rows, width, 1, 3), dtype=np.float32)
+            _mean(light, samples, picture)
             _copy(picture, light)
+            shape = (width, 1, samples)
         for item in solids if first else softs:
             if item < len(faces):
                 _face(
-                    faces[item], face_box[item], top, bottom, first, light, depth, camera, offsets, lamp, shadow, matrix
+                    faces[item], face_box[item], top, bottom, first, light, depth, shape, camera, offsets, lamp, shadow, matrix
                 )
             elif item < capsule_first:
                 i = item - len(faces)
                 if first:
-                    _ball_solid(balls[i], ball_box[i], top, bottom, light, depth, camera, offsets, lamp, shadow, matrix)
+                    _ball_solid(balls[i], ball_box[i], top, bottom, light, depth, shape, camera, offsets, lamp, shadow, matrix)
                 elif balls[i, 8] > ZERO:
-                    _ball_glow(balls[i], ball_box[i], top, bottom, solid, light, depth, camera)
+                    _ball_glow(balls[i], ball_box[i], top, bottom, solid, light, depth, shape, camera)
                 else:
-                    _ball_soft(balls[i], ball_box[i], top, bottom, solid, light, depth, camera, lamp, shadow, matrix)
+                    _ball_soft(balls[i], ball_box[i], top, bottom, solid, light, depth, shape, camera, lamp, shadow, matrix)
             else:
                 i = item - capsule_first
                 if first:
                     _capsule_solid(
-                        capsules[i], capsule_box[i], top, bottom, light, depth, camera, offsets, lamp, shadow, matrix
+                        capsules[i], capsule_box[i], top, bottom, light, depth, shape, camera, offsets, lamp, shadow, matrix
                     )
                 else:
                     _capsule_soft(
-                        capsules[i], capsule_box[i], top, bottom, solid, light, depth, camera, lamp, shadow, matrix
+                        capsules[i], capsule_box[i], top, bottom, solid, light, depth, shape, camera, lamp, shadow, matrix
                     )
-    _mean(light, picture)
+    _mean(light, shape[1], picture)
     _spill(picture, bright)

@@ -1,5 +1,8 @@
 """The loops that turn light into a picture: bloom, tone map, sRGB, dither."""
 
+# Numba infers the types of kernels.
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator, no-any-return, call-arg"
+
 import math
 
 import numpy as np
@@ -12,7 +15,7 @@ ONE = np.float32(1.0)
 HALF = np.float32(0.5)
 SHOULDER = np.float32(0.6)  # below this the tone map changes nothing
 BLINDING = np.float32(1e30)
-FADE = np.float32(0.35)  # how much a light that is too bright for its hue turns white
+FADE = np.float32(0.5)  # how much a light that is too bright for its hue turns white
 
 
 @inner

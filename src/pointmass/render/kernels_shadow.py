@@ -1,5 +1,8 @@
 """The loops that draw the shadow map."""
 
+# Numba infers the types of kernels.
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator, no-any-return, call-arg"
+
 import math
 
 import numpy as np
@@ -21,8 +24,7 @@ def _clamp(value, low, high):
 
 @inner
 def _keep_nearest(depth, row, column, value):
-    if value < depth[row, column]:  # false for NaN
-        depth[row, column] = value
+    depth[row, column] = min(value, depth[row, column])
 
 
 @inner

@@ -15,7 +15,7 @@ TEXELS = 1024  # side of the map
 BAND = 64  # rows that one thread draws at a time
 MARGIN = 6  # free texels around it
 GROWTH = 1.25  # the map's extent is a power of this, so that shadows do not crawl when the scene breathes
-MANY = 1000  # larger clouds are measured by their percentiles
+MANY = 1000  # larger clouds are measured by their percentiles, too
 THINNEST = 0.75  # casters are at least this wide [texels]
 
 
@@ -83,11 +83,7 @@ def shadow(all_casters: list[Casters], light: F64) -> Shadow:
         return no_shadow()
     axes = _light_axes(light)
     placed = turn(found, axes)
-    low, high = (
-        (placed.min(axis=0), placed.max(axis=0))
-        if len(placed) <= MANY
-        else (np.percentile(placed, 1.0, axis=0), np.percentile(placed, 99.0, axis=0))
-    )
+    low, high = _bounds(placed)
     widest = max((float(c.balls[:, 3].max()) for c in all_casters if len(c.balls)), default=0.0)
     extent = max(float((high - low)[:2].max()) * 1.1 + 2.0 * widest, 1e-9)
     extent = GROWTH ** math.ceil(math.log(extent, GROWTH))
@@ -97,7 +93,8 @@ def shadow(all_casters: list[Casters], light: F64) -> Shadow:
     matrix = np.concatenate((axes * scale, -shift[:, None]), axis=1).astype(np.float32)
 
     def texels(points: F64) -> F64:
-        return turn(points, axes) * scale - shift
+        placed: F64 = turn(points, axes) * scale - shift
+        return placed
 
     parts_f, parts_b, parts_c = [], [], []
     for c in all_casters:
@@ -111,6 +108,15 @@ def shadow(all_casters: list[Casters], light: F64) -> Shadow:
     rows = [np.ascontiguousarray(np.concatenate(parts), dtype=np.float32) for parts in (parts_f, parts_b, parts_c)]
     each(lambda i: kernels_shadow.cast(i * BAND, (i + 1) * BAND, depth, *rows), TEXELS // BAND)
     return Shadow(depth, matrix)
+
+
+def _bounds(placed: F64) -> tuple[F64, F64]:
+    """Lowest and highest corner of what the map must hold; a runaway of a large cloud does not spread it thin."""
+    low, high = placed.min(axis=0), placed.max(axis=0)
+    if len(placed) <= MANY:
+        return low, high
+    first, last = np.percentile(placed, (1.0, 99.0), axis=0)
+    return np.maximum(low, 2.0 * first - last), np.minimum(high, 2.0 * last - first)
 
 
 def _light_axes(light: F64) -> F64:

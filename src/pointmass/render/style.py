@@ -22,6 +22,7 @@ class Style:
     samples : samples for each pixel and axis for solid things (1 to 4); 2 means four samples per pixel.
     light : direction from the scene towards the key light, in world coordinates.
     ambient : strength of the light that comes from everywhere.
+    pool : radius of the pool of light around the camera's target, in halves of the picture's height (0 = no end).
     bloom : how much of what is brighter than white spills around it (0 = none).
     shadows : whether solid things throw shadows.
     caption : write the time and the frame's quantities into the lower left corner.
@@ -31,19 +32,21 @@ class Style:
     InvalidInput : a number is out of its range.
     """
 
-    bottom: Triple = (0.0135, 0.0165, 0.0230)
+    bottom: Triple = (0.0105, 0.0150, 0.0240)
     top: Triple = (0.0030, 0.0042, 0.0085)
     exposure: float = 1.0
     samples: int = 2
     light: Triple = (-0.45, 1.0, 0.55)
-    ambient: float = 0.42
-    bloom: float = 0.35
+    ambient: float = 0.34
+    pool: float = 1.8
+    bloom: float = 0.6
     shadows: bool = True
     caption: bool = False
 
     def __post_init__(self) -> None:
         number("style.exposure", self.exposure, above=0.0)
         number("style.ambient", self.ambient, at_least=0.0)
+        number("style.pool", self.pool, at_least=0.0)
         number("style.bloom", self.bloom, at_least=0.0)
         if whole_number("style.samples", self.samples, at_least=1) > 4:
             raise InvalidInput(f"style.samples = {self.samples} is not allowed: it must be 1, 2, 3 or 4")

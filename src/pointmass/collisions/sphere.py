@@ -1,0 +1,72 @@
+"""A sphere, from outside or inside."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.collisions.collider import Array, Collider, Contact, rows_dot
+from pointmass.errors import number
+from pointmass.laws.parameter import Vector
+
+
+class Sphere(Collider):
+    """A ball that particles bounce off, or with `inside` a bowl that holds them.
+
+    Parameters
+    ----------
+    center : [m]; a function of t moves it.
+    radius : [m], greater than 0.
+    inside : whether the free space is inside.
+    restitution, friction, eps, contact : as for every collider.
+    """
+
+    bulges: ClassVar[bool]
+
+    def __init__(
+        self,
+        center: Vector = (0.0, 0.0, 0.0),
+        radius: float = 1.0,
+        *,
+        inside: bool = False,
+        restitution: float = 0.5,
+        friction: float = 0.3,
+        eps: float = 1e-4,
+        contact: Contact = "swept",
+    ) -> None:
+        super().__init__(center, restitution, friction, eps, contact)
+        self.radius = number("radius", radius, above=0, unit="m")
+        self.bulges = not inside  # type: ignore[misc]  # a property of this sphere
+        self.sign = -1.0 if inside else 1.0
+
+    def local_distance(self, x: Array) -> Array:
+        return x.dtype.type(self.sign) * (np.sqrt(rows_dot(x, x)) - x.dtype.type(self.radius))
+
+    def local_normal(self, x: Array) -> Array:
+        r = np.sqrt(rows_dot(x, x))[:, None]
+        up = np.array([0, 1, 0], x.dtype)  # at the very centre every direction is as good
+        return x.dtype.type(self.sign) * np.where(r > 0, x / np.where(r > 0, r, 1), up)
+
+    def bending(self, x: Array, v: Array) -> Array:
+        r2 = rows_dot(x, x)
+        r2 = np.where(r2 > 0, r2, 1)
+        across = rows_dot(v, v) - rows_dot(x, v) ** 2 / r2
+        return x.dtype.type(self.sign) * across / np.sqrt(r2)
+
+    def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:
+        return sphere_mesh(self.radius)
+
+
+def sphere_mesh(radius: float, rings: int = 32) -> tuple[Array, NDArray[np.int32]]:
+    """A sphere of triangles between circles of latitude."""
+    around = 2 * rings
+    latitude, longitude = np.linspace(0, np.pi, rings + 1), np.linspace(0, 2 * np.pi, around, endpoint=False)
+    a, b = np.meshgrid(latitude, longitude, indexing="ij")
+    corners = np.stack([np.sin(a) * np.cos(b), np.cos(a), np.sin(a) * np.sin(b)], axis=-1).reshape(-1, 3)
+    i, j = np.meshgrid(np.arange(rings), np.arange(around), indexing="ij")
+    here, right = i * around + j, i * around + (j + 1) % around
+    quads = np.stack([here, right, right + around, here + around], axis=-1).reshape(-1, 4)
+    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return radius * corners, faces.astype(np.int32)

@@ -1,0 +1,319 @@
+"""How a simulation looks: turns particles, springs, fields and colliders into the drawables of a frame."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, fields
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.collisions.collider import Collider
+from pointmass.errors import InvalidInput, number, unknown, whole_number
+from pointmass.forces.springs import Springs
+from pointmass.frame import Arrows, Curves, Drawable, Points, Segments, Triangles
+from pointmass.particles import Array
+from pointmass.solvers import RK4
+from pointmass.system import ParticleSystem
+
+PALETTES = {  # sRGB anchors from low to high
+    "fire": ("#3b0f5c", "#a01a58", "#e8452c", "#ffa62b", "#fff3b0"),
+    "ice": ("#0b2545", "#13518f", "#2f9fd0", "#8fe0f0", "#f4ffff"),
+    "spectrum": ("#5465ff", "#2ec4b6", "#9be15d", "#ffd23f", "#ff5d5d"),
+    "aurora": ("#16324f", "#18a999", "#7ae582", "#f6f740", "#ff6f91"),
+}
+FAMILY_COLORS = {"stretch": "#5fa8ff", "shear": "#5fe3a1", "bend": "#ff6b6b"}  # as on the lecture's cloth slide
+
+
+@dataclass(frozen=True, kw_only=True)
+class Look:
+    """What a frame shows.
+
+    Attributes
+    ----------
+    particles : "solid": shaded balls; "glow": points of light; "none".
+    size : radius at which particles are drawn [m]; None = their own radius, or 1% of the scene if they have none.
+    color : of particles, a name or "#rrggbb".
+    color_by : "speed", "age", "id" or a particle attribute: colours from the palette instead.
+    color_range : values at both ends of the palette; None = those of the frame.
+    palette : fire, ice, spectrum or aurora.
+    brightness : factor on the light of glowing particles.
+    springs : whether springs are drawn, as lines of `spring_width` [m] (None = 0.3% of the scene) and `spring_color`
+        (None = by family).
+    trails : length of the particles' trails [s], 0 = none.
+    arrows : arrows of a flow along the longest side, 0 = none.
+    streamlines : integral curves of a flow, 0 = none.
+    colliders : whether surfaces are drawn, in `collider_color`.
+    floor_size : edge of the part of an infinite plane that is drawn [m]; None = 3 times the scene.
+    """
+
+    particles: Literal["solid", "glow", "none"] = "solid"
+    size: float | None = None
+    color: str = "#ffb454"
+    color_by: str | None = None
+    color_range: tuple[float, float] | None = None
+    palette: str = "fire"
+    brightness: float = 1.0
+    springs: bool = True
+    spring_width: float | None = None
+    spring_color: str | None = None
+    trails: float = 0.0
+    arrows: int = 0
+    streamlines: int = 0
+    colliders: bool = True
+    collider_color: str = "#5b6678"
+    floor_size: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.particles not in ("solid", "glow", "none"):
+            raise InvalidInput(f"look.particles = {self.particles!r} is not allowed: it must be solid, glow or none")
+        if self.palette not in PALETTES:
+            raise unknown("palette", self.palette, PALETTES)
+        for color in (self.color, self.collider_color, self.spring_color):
+            if color is not None:
+                linear(color)
+        for name in ("size", "spring_width", "floor_size"):
+            if getattr(self, name) is not None:
+                number(f"look.{name}", getattr(self, name), above=0, unit="m")
+        number("look.brightness", self.brightness, at_least=0)
+        number("look.trails", self.trails, at_least=0, unit="s")
+        for name in ("arrows", "streamlines"):
+            whole_number(f"look.{name}", getattr(self, name), at_least=0)
+
+    def described(self) -> dict[str, Any]:
+        """The fields that are not at their default."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) != f.default}
+
+    def drawables(
+        self, system: ParticleSystem, t: float, x: Array, v: Array, frame: int, trails: Trails
+    ) -> tuple[Drawable, ...]:
+        """Everything that a frame shows, for the system at (t, x, v)."""
+        extent = _extent(x)
+        colors = self._colors(system, x, v)
+        result: list[Drawable] = []
+        if self.colliders:
+            result += [self._collider(c, k, t, extent, frame) for k, c in enumerate(system.colliders)]
+        if system.order == 1 and (self.arrows or self.streamlines):
+            result += self._field(system, t, x, frame)
+        if self.springs:
+            result += self._springs(system, extent)
+        if self.trails > 0:
+            result += trails.drawn(self, system.particles.id, colors, extent, frame)
+        if self.particles != "none" and len(x):
+            own = system.particles.radius
+            radius = np.float32(self.size) if self.size else np.where(own > 0, own, 0.01 * extent).astype(np.float32)
+            result.append(
+                Points(name="particles", version=frame, radius=radius, color=colors, glow=self.particles == "glow")
+            )
+        return tuple(result)
+
+    def _colors(self, system: ParticleSystem, x: Array, v: Array) -> Array:
+        n = len(x)
+        if self.color_by is None:
+            return np.tile(linear(self.color, self.brightness), (n, 1))
+        p = system.particles
+        if self.color_by == "speed":
+            value = np.sqrt((v * v).sum(axis=1))
+        elif self.color_by == "id":
+            value = (p.id * 0.6180339887498949) % 1.0  # neighbours get colours far apart
+        else:
+            value = p.column(self.color_by)
+        low, high = self.color_range or ((value.min(), value.max()) if n else (0.0, 1.0))
+        level = np.clip((value - low) / (high - low if high > low else 1.0), 0, 1)
+        return palette(self.palette, level, self.brightness)
+
+    def _collider(self, collider: Collider, k: int, t: float, extent: float, frame: int) -> Triangles:
+        corners, faces = collider.mesh(self.floor_size or 3 * extent)
+        inside = getattr(collider, "sign", 1.0) < 0 or bool(getattr(collider, "walls", ()))
+        color = linear(self.collider_color)
+        color[3] = 0.12 if inside else 1.0  # one has to see into a room
+        return Triangles(
+            name=f"{collider.name.lower()} {k}",
+            version=frame if collider.moves else 0,
+            vertices=(corners + collider.at(t)).astype(np.float32),
+            faces=faces,
+            color=color,
+            smooth=type(collider).__name__ == "Sphere",
+        )
+
+    def _springs(self, system: ParticleSystem, extent: float) -> list[Drawable]:
+        width = np.float32(self.spring_width or 0.003 * extent)
+        result: list[Drawable] = []
+        for k, force in enumerate(system.forces):
+            if isinstance(force, Springs) and len(force.ids):
+                color = linear(self.spring_color or FAMILY_COLORS.get(force.family, "#9fb4cc"))
+                pairs = force.rows(system.particles).astype(np.int32)
+                version = system.particles.version
+                result.append(
+                    Segments(name=f"{force.family} {k}", version=version, pairs=pairs, width=width, color=color)
+                )
+        return result
+
+    def _field(self, system: ParticleSystem, t: float, x: Array, frame: int) -> list[Drawable]:
+        low, high = _bounds(x)
+        steady = not any("t" in getattr(f, "traced").depends_on for f in system.forces if hasattr(f, "traced"))
+        version = 0 if steady else frame
+        result: list[Drawable] = []
+        if self.arrows:
+            result.append(_field_arrows(system, t, low, high, self.arrows, version))
+        if self.streamlines:
+            result.append(_streamlines(system, t, low, high, self.streamlines, version))
+        return result
+
+
+class Trails:
+    """Where particles were in the last seconds."""
+
+    def __init__(self, look: Look) -> None:
+        self.span = look.trails
+        self._past: deque[tuple[float, NDArray[np.int64], Array]] = deque()
+
+    def remember(self, t: float, ids: NDArray[np.int64], x: Array) -> None:
+        """Note a look at time t, and forget what is too long ago."""
+        if self.span <= 0:
+            return
+        self._past.append((t, ids.copy(), x.astype(np.float32)))
+        while self._past and self._past[0][0] < t - self.span - 1e-9:
+            self._past.popleft()
+
+    def drawn(self, look: Look, ids: NDArray[np.int64], colors: Array, extent: float, frame: int) -> list[Drawable]:
+        """One curve for each living particle, thinner and fainter towards its past."""
+        if len(self._past) < 2 or not len(ids):
+            return []
+        now = self._past[-1][0]
+        order = np.argsort(ids, kind="stable")
+        points, owner, age = [], [], []
+        for t, then, x in self._past:
+            place = np.minimum(np.searchsorted(ids, then, sorter=order), len(ids) - 1)
+            row = order[place]
+            alive = ids[row] == then
+            points.append(x[alive])
+            owner.append(row[alive])
+            age.append(np.full(int(alive.sum()), (now - t) / self.span, np.float32))
+        rows = np.concatenate(owner)
+        by_particle = np.argsort(rows, kind="stable")
+        counts = np.bincount(rows, minlength=len(ids))
+        fade = (1 - np.concatenate(age)[by_particle]).clip(0, 1)
+        color = colors[rows[by_particle]].copy()
+        color[:, 3] *= fade**1.5
+        return [
+            Curves(
+                name="trails",
+                version=frame,
+                vertices=np.concatenate(points)[by_particle],
+                index=np.arange(len(rows), dtype=np.int32),
+                offsets=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
+                width=np.float32(look.size or 0.008 * extent) * (0.35 + 0.65 * fade),
+                color=color,
+                glow=look.particles == "glow",
+            )
+        ]
+
+
+def linear(color: str, brightness: float = 1.0) -> NDArray[np.float32]:
+    """A colour name or "#rrggbb" as linear-light RGBA, shape (4,)."""
+    from PIL import ImageColor
+
+    try:
+        rgb = np.array(ImageColor.getrgb(color)[:3], np.float64) / 255
+    except (ValueError, AttributeError):
+        raise InvalidInput(f"color {color!r} is not known: use a name such as orange, or #rrggbb") from None
+    light = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    return np.append(brightness * light, 1.0).astype(np.float32)
+
+
+def palette(name: str, level: Array, brightness: float = 1.0) -> NDArray[np.float32]:
+    """Colours of levels in [0, 1], shape (n, 4)."""
+    anchors = np.array([linear(c, brightness) for c in PALETTES[name]])
+    at = np.linspace(0, 1, len(anchors))
+    return np.stack([np.interp(level, at, anchors[:, k]) for k in range(4)], axis=1).astype(np.float32)
+
+
+def _bounds(x: Array) -> tuple[Array, Array]:
+    if not len(x):
+        return -np.ones(3), np.ones(3)
+    low, high = x.min(axis=0), x.max(axis=0)
+    margin = 0.1 * max(float((high - low).max()), 1e-6)
+    flat = (high - low) < 1e-9
+    return np.where(flat, low, low - margin), np.where(flat, high, high + margin)
+
+
+def _extent(x: Array) -> float:
+    """Size of the scene [m]: robust against a few that have flown far away."""
+    if len(x) < 2:
+        return 1.0
+    low, high = np.percentile(x, [2, 98], axis=0)
+    return max(float((high - low).max()), 1e-3)
+
+
+def _velocity(system: ParticleSystem, t: float, points: Array) -> Array:
+    """The flow at any points, shape (k, 3)."""
+    from pointmass.particles import Particles
+
+    probe = Particles(points, dtype=system.particles.dtype)
+    total = np.zeros_like(probe.x)
+    for force in system.forces:
+        if force.enabled and force.on is None:
+            force.add_forces(probe, t, probe.x, probe.v, total)
+    return np.where(np.isfinite(total), total, 0)
+
+
+def _grid(low: Array, high: Array, count: int) -> Array:
+    step = float((high - low).max()) / count
+    axes = [np.arange(a + step / 2, b, step) if b > a else np.array([a]) for a, b in zip(low, high, strict=True)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _field_arrows(system: ParticleSystem, t: float, low: Array, high: Array, count: int, version: int) -> Arrows:
+    tails = _grid(low, high, count)
+    flow = _velocity(system, t, tails)
+    speed = np.sqrt((flow * flow).sum(axis=1))
+    step = float((high - low).max()) / count
+    top = float(np.percentile(speed, 95)) if len(speed) else 0.0
+    size = 0.8 * step * np.minimum(speed / top, 1) if top > 0 else np.zeros(len(speed))
+    vectors = flow * (size / np.where(speed > 0, speed, 1))[:, None]
+    color = palette("ice", 0.25 + 0.5 * np.minimum(speed / (top or 1), 1))
+    return Arrows(
+        name="field",
+        version=version,
+        vertices=(tails - 0.5 * vectors).astype(np.float32),
+        vectors=vectors.astype(np.float32),
+        width=np.float32(0.07 * step),
+        color=color,
+    )
+
+
+def _streamlines(system: ParticleSystem, t: float, low: Array, high: Array, count: int, version: int) -> Curves:
+    """Integral curves of the field frozen at t, by RK4 with steps along the curve, from evenly spread seeds."""
+    side = max(2, round(count ** (1 / max(1, int((high > low).sum())))))
+    x = _grid(low, high, side)[:count]
+    step = 0.01 * float((high - low).max())
+    steps = 120
+    path = [x]
+    tableau = RK4
+
+    def unit_flow(points: Array) -> Array:
+        flow = _velocity(system, t, points)
+        size = np.sqrt((flow * flow).sum(axis=1))[:, None]
+        return flow / np.where(size > 1e-12, size, 1) * (size > 1e-12)
+
+    from pointmass.solvers import FunctionSystem
+
+    k = len(x)
+    curve = FunctionSystem(lambda s, y: unit_flow(y.reshape(k, 3)).ravel(), 3 * k)
+    for _ in range(steps):
+        path.append(tableau().step(curve, 0.0, path[-1].ravel(), step, {}).y1.reshape(k, 3))
+    points = np.stack(path, axis=1)
+    inside = ((points >= low - step) & (points <= high + step)).all(axis=2)
+    length = np.where(inside.all(axis=1), points.shape[1], np.argmin(inside, axis=1))
+    keep = np.arange(points.shape[1])[None, :] < length[:, None]
+    return Curves(
+        name="streamlines",
+        version=version,
+        vertices=points[keep].astype(np.float32),
+        index=np.arange(int(keep.sum()), dtype=np.int32),
+        offsets=np.concatenate([[0], np.cumsum(length)]).astype(np.int32),
+        width=np.float32(0.25 * step),
+        color=linear("#3d6d8f"),
+    )

@@ -1,0 +1,275 @@
+"""A run: a system, a solver, a step, and looks at it from time to time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.emitters.emitter import Emitter
+from pointmass.engine.reference import ReferenceEngine
+from pointmass.errors import Diverged, InvalidInput, number, whole_number
+from pointmass.frame import Frame
+from pointmass.look import Look, Trails
+from pointmass.particles import Array
+from pointmass.solvers import RK4, SymplecticEuler
+from pointmass.solvers.base import Solver
+from pointmass.stability import stability
+from pointmass.system import ParticleSystem
+
+DEFAULT_DT = 1 / 240  # 60 frames a second with 4 substeps
+RUNAWAY = 1e6  # times the speeds that the start of a run explains: a run this fast has diverged
+ON_GRID = 1e-9  # of a step: a frame this near to the grid is on it
+
+
+class Simulation:
+    """Steps a particle system through time.
+
+    Parameters
+    ----------
+    system : belongs to the simulation from now on.
+    solver : SymplecticEuler() by default, RK4() for a flow.
+    dt : the solver's step [s], on the grid t0 + k dt with whole k; 1/240 by default. An adaptive solver makes steps of its own
+        in between. How often frames are looked at changes nothing.
+    emitters : where particles come from.
+    look : how frames look.
+    seed : all chance comes from it.
+
+    Attributes
+    ----------
+    t : time now [s].
+    steps : how many steps of dt were made.
+
+    Raises
+    ------
+    InvalidInput
+        dt that is not positive, something that is not a solver, an emitter in a flow.
+
+    Examples
+    --------
+    >>> sim = pm.Simulation(system, solver=pm.RK4(), dt=1 / 240)
+    >>> for frame in sim.frames(240, fps=60):
+    ...     print(frame.time, frame.positions[0])
+    """
+
+    def __init__(
+        self,
+        system: ParticleSystem,
+        solver: Solver | None = None,
+        dt: float = DEFAULT_DT,
+        *,
+        emitters: Sequence[Emitter] = (),
+        look: Look | None = None,
+        seed: int = 0,
+    ) -> None:
+        if solver is None:
+            solver = SymplecticEuler() if system.order == 2 else RK4()
+        if not isinstance(solver, Solver):
+            raise InvalidInput(f"solver must be a solver, such as pm.RK4(), not {solver!r}")
+        self.system = system
+        self.solver = solver
+        self.dt = number("dt", dt, above=0, unit="s")
+        self.seed = whole_number("seed", seed, at_least=0)
+        self.emitters = list(emitters)
+        self.look = look or Look()
+        self.t0 = system.t
+        self.steps = 0
+        self.frames_seen = 0
+        self.engine = ReferenceEngine(system, solver)
+        self._start = system.get_state()
+        self._trails = Trails(self.look)
+        self._lifetimes: dict[int, float] = {}
+        self._speed_limit = RUNAWAY * self._natural_speed()
+
+    @property
+    def t(self) -> float:
+        """Time now [s]."""
+        return self._grid(self.steps)
+
+    def step(self, count: int = 1) -> None:
+        """Make steps of dt.
+
+        Raises
+        ------
+        Diverged
+            The run cannot go on; the system keeps its last good state. The error names particle, force, step and the
+            largest stable dt.
+        """
+        for _ in range(whole_number("count", count, at_least=0)):
+            t0, t1 = self._grid(self.steps), self._grid(self.steps + 1)
+            births = self._bear(t0, t1)
+            before = self.system.get_state()
+            try:
+                self.engine.step(t0, t1, births)
+                self._check_speed(before)
+            except Diverged as error:
+                raise self._explained(error) from error
+            self.steps += 1
+            self._age(t0, t1, births)
+
+    def frames(self, count: int, fps: float = 60.0) -> Iterator[Frame]:
+        """Run and look: `count` frames, the first one at once, then one every 1/fps s.
+
+        A second call goes on where the first one ended. A frame that falls between two steps is interpolated (dense output); it
+        changes no state, so the run is the same for any fps.
+        """
+        count = whole_number("frames", count, at_least=1)
+        fps = number("fps", fps, above=0, unit="1/s")
+        return self._frames(count, fps)
+
+    def frame(self, number: int = 0, t: float | None = None) -> Frame:
+        """A look at the system now, or at a time within the last step."""
+        system, now = self.system, self.t if t is None else t
+        p = system.particles
+        x, v = p.x, p.v
+        if t is not None and t < self.t:
+            x, v = system.split(self.engine.state_at(t))
+        self._trails.remember(now, p.id, x)
+        drawables = self.look.drawables(system, now, x, v, number, self._trails)
+        return Frame(
+            number=number,
+            time=now,
+            ids=p.id.copy(),
+            positions=x.copy(),
+            velocities=self._velocities(now, x, v),
+            drawables=drawables,
+            quantities=self.quantities(),
+        )
+
+    def quantities(self) -> dict[str, float]:
+        """Diagnostics now: energies [J], momentum [kg m/s], largest relative stretch of a spring, number of particles."""
+        system = self.system
+        result = {"particles": float(len(system.particles))}
+        if system.order == 2:
+            energy, momentum = system.energy(), system.momentum()
+            result |= {"energy": energy.total, "kinetic": energy.kinetic, "potential": energy.potential}
+            result |= {f"momentum_{a}": float(q) for a, q in zip("xyz", momentum, strict=True)}
+            result["stretch"] = system.stretch()
+        return result
+
+    # ------------------------------------------------------------------------------------------------ inside
+
+    def _grid(self, k: int) -> float:
+        return self.t0 + k * self.dt  # never accumulated
+
+    def _frames(self, count: int, fps: float) -> Iterator[Frame]:
+        for _ in range(count):
+            n = self.frames_seen
+            time = self.t0 + n / fps
+            k = (time - self.t0) / self.dt
+            on_grid = abs(k - round(k)) < ON_GRID * max(1.0, k)
+            self.step(max(0, (round(k) if on_grid else int(np.ceil(k))) - self.steps))
+            self.frames_seen += 1
+            yield self.frame(n, self.t if on_grid else time)
+
+    def _bear(self, t0: float, t1: float) -> Array | None:
+        """Add the particles that are born in this step; returns the clock of all particles."""
+        births = [e.births(t0, t1, self.seed, f"{type(e).__name__} {k}") for k, e in enumerate(self.emitters)]
+        if not any(len(b.number) for b in births):
+            return None
+        clock = [np.full(len(self.system.particles), t0)]
+        for k, birth in enumerate(births):
+            ids = self.system.add(birth.x, birth.v, id=birth.ids(k), **birth.columns)
+            mortal = np.isfinite(birth.lifetime)
+            self._lifetimes |= dict(zip(ids[mortal].tolist(), birth.lifetime[mortal].tolist(), strict=True))
+            clock.append(np.maximum(birth.time, t0))
+        return np.concatenate(clock)
+
+    def _age(self, t0: float, t1: float, births: Array | None) -> None:
+        p = self.system.particles
+        p.age += (t1 - (np.full(len(p), t0) if births is None else births)).astype(p.dtype)
+        if not self._lifetimes:
+            return
+        limit = np.array([self._lifetimes.get(i, np.inf) for i in p.id.tolist()])
+        dead = p.age >= limit
+        if dead.any():
+            for i in p.id[dead].tolist():
+                del self._lifetimes[i]
+            self.system.remove(dead)
+
+    def _velocities(self, t: float, x: Array, v: Array) -> Array:
+        """Velocities of a frame; in a flow they are the field's."""
+        if self.system.order == 2:
+            return v.copy()
+        return self.system.deriv_eval(t, x.ravel()).reshape(-1, 3)
+
+    # ------------------------------------------------------------------------------------------------ divergence
+
+    def _natural_speed(self) -> float:
+        """The largest speed that the start explains: that of the particles, of their fall for a second, across the scene."""
+        system, p = self.system, self.system.particles
+        if not len(p):
+            return 10.0
+        with np.errstate(all="ignore"):
+            rate = system.deriv_eval(self.t0, self._start)
+        extent = float(np.ptp(p.x, axis=0).max())
+        size = float(np.abs(rate[np.isfinite(rate)]).max(initial=0.0))
+        return max(1.0, extent, size, float(np.abs(p.v).max(initial=0.0)))
+
+    def _check_speed(self, before: Array) -> None:
+        p = self.system.particles
+        if np.abs(p.v).max(initial=0.0) > self._speed_limit or np.abs(p.x).max(initial=0.0) > 1e3 * self._speed_limit:
+            self.system.set_state(before, self._grid(self.steps))
+            raise Diverged("speeds grow without bound")
+
+    def _explained(self, error: Diverged) -> Diverged:
+        """The error with everything that a user wants to know."""
+        system, p = self.system, self.system.particles
+        row, force, partners = culprit(system)
+        where = f"particle {p.id[row]}" if len(p) else "no particle"
+        if partners:
+            where += f" and particle {', '.join(str(p.id[r]) for r in partners[:3])}"
+        limit = self._largest_safe_dt()
+        advice = "use another solver or softer forces"
+        if limit is not None and 0 < limit < np.inf:
+            advice = f"the largest stable dt of {self.solver.name} is {limit:.3g} s and dt is {self.dt:.3g} s"
+        elif limit == 0:
+            advice = f"{self.solver.name} amplifies this motion at any dt: use symplectic_euler, rk4 or implicit_euler"
+        return Diverged(
+            f"diverged in step {self.steps} (t = {self.t:.6g} s) at {where}, force {force}: {advice} ({error})",
+            particle=int(p.id[row]) if len(p) else None,
+            force=force,
+            step=self.steps,
+            time=self.t,
+            largest_safe_dt=limit,
+        )
+
+    def _largest_safe_dt(self) -> float | None:
+        """From the stiffnesses at the start of the run, before anything was torn apart."""
+        system = self.system
+        now = system.get_state()
+        if self._start.shape != now.shape:
+            return None
+        system.set_state(self._start)
+        try:
+            return stability(system, self.solver).largest_safe_dt
+        except InvalidInput:
+            return None
+        finally:
+            system.set_state(now)
+
+
+def culprit(system: ParticleSystem) -> tuple[int, str, list[int]]:
+    """Row of the particle that is worst off, the force that acts most on it, and rows of its partners in that force."""
+    p = system.particles
+    if not len(p):
+        return 0, "none", []
+    strengths: dict[str, NDArray[Any]] = {}
+    forces = [f for f in system.forces if f.enabled]
+    for force in forces:
+        f = np.zeros_like(p.x)
+        with np.errstate(all="ignore"):
+            force.add_forces(p, system.t, p.x, p.v, f)
+            strengths[force.name] = np.where(np.isfinite(f).all(axis=1), np.sqrt((f * f).sum(axis=1)), np.inf)
+    with np.errstate(all="ignore"):
+        speed = np.where(p.pinned, 0, np.sqrt((p.v * p.v).sum(axis=1)))
+    total = sum(strengths.values(), np.zeros(len(p)))
+    row = int(np.argmax(~np.isfinite(total))) if not np.isfinite(total).all() else int(np.argmax(speed))
+    if not strengths:
+        return row, "none", []
+    name = max(strengths, key=lambda n: strengths[n][row])
+    force = next(f for f in forces if f.name == name)
+    singular = not np.isfinite(strengths[name][row])
+    return row, name, force.partners(p, row) if singular else []
