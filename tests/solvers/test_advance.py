@@ -141,7 +141,7 @@ def test_prepare_sees_the_clock_and_the_step_of_each_island():
 
     def prepare(clock, h, y):
         seen.append((clock.copy(), h.copy()))
-        return y + [0.0, 0.0, 1.0, 0.0]
+        return y + np.array([0.0, 0.0, 1.0, 0.0])
 
     system = oscillators([0.0, 0.0], [0.0, 0.0])
     y, _, _ = advance(system, fixed("rk4"), 0.0, 1.0, np.zeros(4), {}, clock=np.array([0.0, 0.5]), prepare=prepare)

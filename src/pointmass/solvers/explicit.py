@@ -73,12 +73,13 @@ class ExplicitRungeKutta(Solver):
         cls._weights = floats(cls.b)
 
     def step(self, system: System, t: Clock, y: Array, h: Clock, memory: Memory) -> Step:
-        """The state at t + h; the slope at the end is evaluated only if dense output asks for it."""
+        """The state at t + h; the slope there is evaluated only if the error estimate or dense output asks."""
         length = np.asarray(h, y.dtype)
         slopes = self._slopes(system, t, y, h)
         y1 = moved(h, y, y + length * weighted(self._weights, slopes))
         end = cache(lambda: system.deriv_eval(t + h, y1))
-        return Step(t, h, y, y1, self._dense(length, y, y1, slopes, end), memory)
+        dense = self._dense(length, y, y1, slopes, end)
+        return Step(t, h, y, y1, dense, memory, self._error(length, slopes, end))
 
     def _slopes(self, system: System, t: Clock, y: Array, h: Clock) -> list[Array]:
         length = np.asarray(h, y.dtype)
@@ -86,6 +87,9 @@ class ExplicitRungeKutta(Solver):
         for c, a in self._stages:
             slopes.append(system.deriv_eval(t + c * h, y + length * weighted(a, slopes)))
         return slopes
+
+    def _error(self, h: Array, slopes: list[Array], end: Callable[[], Array]) -> Array | None:
+        return None
 
     def _dense(
         self, h: Array, y0: Array, y1: Array, slopes: list[Array], end: Callable[[], Array]
@@ -136,16 +140,10 @@ class EmbeddedRungeKutta(ExplicitRungeKutta):
         """What the step control knows about each island before its first step."""
         return self.control.start(number_of(system.islands)) if self.control else {}
 
-    def step(self, system: System, t: Clock, y: Array, h: Clock, memory: Memory) -> Step:
-        """The state at t + h, and if adaptive an estimate of its error."""
-        length = np.asarray(h, y.dtype)
-        slopes = self._slopes(system, t, y, h)
-        y1 = moved(h, y, y + length * weighted(self._weights, slopes))
-        end = cache(lambda: system.deriv_eval(t + h, y1))
-        error = None
-        if self.adaptive:
-            error = moved(h, np.zeros_like(y), length * weighted(self._error_weights, [*slopes, end()]))
-        return Step(t, h, y, y1, self._dense(length, y, y1, slopes, end), memory, error)
+    def _error(self, h: Array, slopes: list[Array], end: Callable[[], Array]) -> Array | None:
+        if not self.adaptive:
+            return None
+        return moved(h, np.zeros_like(slopes[0]), h * weighted(self._error_weights, [*slopes, end()]))
 
     def _dense(
         self, h: Array, y0: Array, y1: Array, slopes: list[Array], end: Callable[[], Array]

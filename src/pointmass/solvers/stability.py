@@ -14,7 +14,7 @@ from pointmass.solvers.base import Array, Memory, Solver
 from pointmass.solvers.control import control_of
 from pointmass.solvers.function_system import FunctionSystem
 
-SHORTEST, LONGEST, TRIALS = 2e-3, 1e4, 600  # steps to try, times the size of the eigenvalue
+SHORTEST, LONGEST, TRIALS = 2e-3, 1e4, 200  # steps to try, times the size of the eigenvalue
 STRICT, TOLERANCE = 1e-12, 1e-9  # growth per step that is round-off, for short steps and for others
 SHORT = 0.02
 HALVINGS = 40
@@ -64,7 +64,9 @@ def largest_safe_step(solver: Solver, eigenvalues: ArrayLike) -> float:
     if control_of(solver) is not None:
         return float("inf")
     modes = _modes(np.asarray(eigenvalues, np.complex128).ravel())
-    return min((_limit(solver, *mode) for mode in modes), default=float("inf"))
+    if not modes:
+        return float("inf")
+    return float(_limits(solver, *np.array(modes).T).min())
 
 
 def _modes(eigenvalues: NDArray[np.complex128]) -> list[tuple[float, float]]:
@@ -80,27 +82,26 @@ def _modes(eigenvalues: NDArray[np.complex128]) -> list[tuple[float, float]]:
     return sorted(modes)
 
 
-def _limit(solver: Solver, stiffness: float, damping: float) -> float:
-    """The step at which the amplification of one oscillator first exceeds 1, by trials and bisection."""
-    scale = max(np.sqrt(stiffness), damping)
-
-    def grows(h: Array) -> NDArray[np.bool_]:
-        allowed = 1.0 + np.where(h * scale < SHORT, STRICT, TOLERANCE)
-        radius = _amplification(solver, np.full(len(h), stiffness), np.full(len(h), damping), h)
-        result: NDArray[np.bool_] = ~(radius <= allowed)
-        return result
-
-    trials = np.geomspace(SHORTEST, LONGEST, TRIALS) / scale
-    growing = np.flatnonzero(grows(trials))
-    if not len(growing):
-        return float("inf")
-    if growing[0] == 0:
-        return 0.0
-    low, high = trials[growing[0] - 1], trials[growing[0]]
+def _limits(solver: Solver, stiffness: Array, damping: Array) -> Array:
+    """The steps at which the amplification of oscillators first exceeds 1, by trials and bisection, shape (k,)."""
+    scale = np.maximum(np.sqrt(stiffness), damping)
+    trials = np.geomspace(SHORTEST, LONGEST, TRIALS)[:, None] / scale
+    lanes = _grows(solver, np.tile(stiffness, TRIALS), np.tile(damping, TRIALS), trials.ravel())
+    growing = lanes.reshape(trials.shape)
+    first, modes = growing.argmax(axis=0), np.arange(len(scale))
+    low, high = trials[np.maximum(first - 1, 0), modes], trials[first, modes]
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if grows(np.array([middle]))[0] else (middle, high)
-    return float(low)
+        beyond = _grows(solver, stiffness, damping, middle)
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    return np.where(growing.any(axis=0), np.where(first == 0, 0.0, low), np.inf)
+
+
+def _grows(solver: Solver, stiffness: Array, damping: Array, h: Array) -> NDArray[np.bool_]:
+    short = h * np.maximum(np.sqrt(stiffness), damping) < SHORT
+    allowed = 1.0 + np.where(short, STRICT, TOLERANCE)
+    result: NDArray[np.bool_] = ~(_amplification(solver, stiffness, damping, h) <= allowed)
+    return result
 
 
 def _amplification(solver: Solver, stiffness: Array, damping: Array, h: Array) -> Array:

@@ -17,7 +17,7 @@ class Yoshida4(Splitting):
 
     Parameters
     ----------
-    passes : fixed-point passes of a closing kick if a depends on v; order 4 needs four.
+    passes : fixed-point passes of a closing kick if a depends on v; two or three give order 3, four give order 4.
 
     Notes
     -----
