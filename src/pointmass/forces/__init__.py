@@ -1,0 +1,72 @@
+"""Forces, one to a file: each is a law with its parameters. A new one is a file, a line in `FORCES` and a test."""
+
+from __future__ import annotations
+
+from pointmass.errors import unknown
+from pointmass.forces.angles import Angles
+from pointmass.forces.attractor import Attractor
+from pointmass.forces.drag import Drag
+from pointmass.forces.field import Field
+from pointmass.forces.flow import Flow
+from pointmass.forces.gravitation import Gravitation
+from pointmass.forces.gravity import Gravity
+from pointmass.forces.grid_files import load_grid
+from pointmass.forces.harmonic import Harmonic
+from pointmass.forces.magnetic import Magnetic
+from pointmass.forces.point_vortices import PointVortices
+from pointmass.forces.quadratic_drag import QuadraticDrag
+from pointmass.forces.springs import Springs
+from pointmass.forces.vortex import Vortex
+from pointmass.forces.wind import Wind
+from pointmass.laws.force import Force
+
+FORCES: dict[str, type[Force]] = {
+    "gravity": Gravity,
+    "drag": Drag,
+    "quadratic_drag": QuadraticDrag,
+    "springs": Springs,
+    "angles": Angles,
+    "attractor": Attractor,
+    "harmonic": Harmonic,
+    "gravitation": Gravitation,
+    "vortex": Vortex,
+    "point_vortices": PointVortices,
+    "wind": Wind,
+    "field": Field,
+    "flow": Flow,
+    "magnetic": Magnetic,
+}
+
+__all__ = [
+    "FORCES",
+    "Angles",
+    "Attractor",
+    "Drag",
+    "Field",
+    "Flow",
+    "Force",
+    "Gravitation",
+    "Gravity",
+    "Harmonic",
+    "Magnetic",
+    "PointVortices",
+    "QuadraticDrag",
+    "Springs",
+    "Vortex",
+    "Wind",
+    "find_force",
+    "load_grid",
+]
+
+
+def find_force(name: str) -> type[Force]:
+    """The class of a force by its name in scene files, such as "quadratic_drag".
+
+    Raises
+    ------
+    InvalidInput
+        No such force; the known ones are listed.
+    """
+    if name not in FORCES:
+        raise unknown("force", name, FORCES)
+    return FORCES[name]

@@ -14,8 +14,8 @@ from pointmass.laws.parameter import Parameter, Scalar
 class Angles(ConstraintForce):
     """A joint a-b-c that wants the angle `rest` between a->b and b->c: E = k_s (theta - rest)^2 / 2.
 
-    theta = atan2(|e1 x e2|, e1 . e2) with e1 = b - a, e2 = c - b is 0 for a straight joint. Damping acts on the rate of the angle.
-    At exactly 0 and pi the direction of bending is not defined and the joint gives no force.
+    theta = atan2(|e1 x e2|, e1 . e2) with e1 = b - a, e2 = c - b is 0 for a straight joint. Damping acts on the rate of
+    the angle. At exactly 0 and pi the direction of bending is not defined and the joint gives no force.
 
     Parameters
     ----------

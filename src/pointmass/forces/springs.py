@@ -55,7 +55,6 @@ class Springs(ConstraintForce):
     def bind(self, particles: Particles) -> None:
         """Measure rest lengths where none were given, and check the ends."""
         if "rest" not in self.parameters:
-            rows = particles.rows(self.ids)
-            ends = particles.x[np.maximum(rows, 0)].astype(np.float64)
+            ends = particles.x[self.found(particles)].astype(np.float64)
             self.parameters["rest"] = Parameter("rest", np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), unit="m")
         super().bind(particles)

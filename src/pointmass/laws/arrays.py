@@ -20,8 +20,8 @@ class ArrayForce(Force):
 
     Parameters
     ----------
-    function : `function(x, v, m, t, **constants) -> f`: x, v, f of shape (n, 3), m of shape (n,); f may be one vector for
-        all. It must be pure. Each particle's force may depend on that particle only (`coupled=False`) or on all of
+    function : `function(x, v, m, t, **constants) -> f`: x, v, f of shape (n, 3), m of shape (n,); f may be one vector
+        for all. It must be pure. Each particle's force may depend on that particle only (`coupled=False`) or on all of
         them (`coupled=True`). Where particles have clocks of their own, t has shape (n,).
     constants : passed to the function by name.
     coupled : whether particles act on each other.

@@ -74,10 +74,7 @@ class ElementForce(Force):
 
     def bind(self, particles: Particles) -> None:
         super().bind(particles)
-        rows = particles.rows(self.ids)
-        if (rows < 0).any():
-            element, node = np.argwhere(rows < 0)[0]
-            raise InvalidInput(f"{self.name} {element} joins particle {self.ids[element, node]}, which does not exist")
+        rows = self.found(particles)
         for p in self.parameters.values():
             p.check(particles, len(self.ids), "elements")
             if p.attributes:
@@ -86,6 +83,20 @@ class ElementForce(Force):
                 )
         self._rows = (particles.version, rows)
         _ = self.traced
+
+    def found(self, particles: Particles) -> Rows:
+        """Rows of the particles of each element, looked up now.
+
+        Raises
+        ------
+        InvalidInput
+            An element that joins a particle that is not there.
+        """
+        rows = particles.rows(self.ids)
+        if (rows < 0).any():
+            element, node = np.argwhere(rows < 0)[0]
+            raise InvalidInput(f"{self.name} {element} joins particle {self.ids[element, node]}, which does not exist")
+        return rows
 
     def rows(self, particles: Particles) -> Rows:
         """Rows of the particles of each element, shape (e, nodes)."""

@@ -229,16 +229,16 @@ class Symbol:
         return self._flipped("div", other)
 
     def __mod__(self, other: Any) -> Symbol:
-        return self - self.lifted(other) * (self // other)
+        return self.apply("sub", self.__floordiv__(other).apply("mul", other))
 
     def __rmod__(self, other: Any) -> Symbol:
-        return self.lifted(other) % self
+        return self.lifted(other).__mod__(self)
 
     def __floordiv__(self, other: Any) -> Symbol:
-        return (self / other).apply("floor")
+        return self.apply("div", other).apply("floor")
 
     def __rfloordiv__(self, other: Any) -> Symbol:
-        return self.lifted(other) // self
+        return self.lifted(other).__floordiv__(self)
 
     def __neg__(self) -> Symbol:
         return self.apply("neg")
@@ -301,7 +301,7 @@ class Symbol:
             "math.exp, np.linalg.norm, ..."
         )
 
-    __int__ = __index__ = __float__  # type: ignore[assignment]
+    __int__ = __index__ = __float__
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Symbol:
         """np.sqrt(x) and its like work on symbols too."""

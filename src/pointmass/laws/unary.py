@@ -142,11 +142,11 @@ def law_parameters(law: Callable[..., Any], fixed: Sequence[str]) -> dict[str, A
     except (TypeError, ValueError):
         raise InvalidInput(f"a law must be a function written in Python, not {law!r}") from None
     first, own = list(names)[: len(fixed)], list(names)[len(fixed) :]
-    named = all(p.kind in (p.POSITIONAL_OR_KEYWORD, p.POSITIONAL_ONLY, p.KEYWORD_ONLY) for p in names.values())
+    named = all(p.kind in (p.POSITIONAL_OR_KEYWORD, p.POSITIONAL_ONLY) for p in names.values())
     swapped = any(n in fixed and fixed[k] != n for k, n in enumerate(first)) or any(n in fixed for n in own)
     if len(first) < len(fixed) or swapped or not named:
         raise InvalidInput(
-            f"law {law_name(law)!r} must take ({', '.join(fixed)}, *parameters), each parameter by a name of its own, "
+            f"law {law_name(law)!r} must take ({', '.join(fixed)}) and then its parameters by name, without * and **, "
             f"not ({', '.join(map(str, names.values()))})"
         )
     for taken in {"on", "enabled", "pairs", "elements"} & set(own):
