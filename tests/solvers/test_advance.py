@@ -160,6 +160,32 @@ def test_the_step_before_the_end_is_not_forgotten():
     assert steps <= whole + 20
 
 
+def test_a_step_cut_short_by_the_end_does_not_shorten_the_next():
+    _, memory, _ = advance(pendulum(), DormandPrince(), 0.0, 1.0, np.array([1.0, 0.0]), {})
+    _, later, _ = advance(pendulum(), DormandPrince(), 1.0, 1.0 + 1e-9, np.array([1.0, 0.0]), memory)
+    assert later["h_next"][0] >= memory["h_next"][0] > 0.01
+
+
+def test_after_a_rejection_the_step_does_not_grow():
+    solver, system = DormandPrince(), pendulum()
+    start = solver.start(system)
+    step = solver.step(system, 0.0, np.array([1.0, 0.0]), 1e-3, start)
+    h = np.array([1e-3])
+    _, free = solver.control.judge(step, h, h, system.islands, start)
+    _, held = solver.control.judge(step, h, h, system.islands, {**start, "rejected": np.array([True])})
+    assert free["h_next"][0] == pytest.approx(10.0 * h[0], rel=1e-12)
+    assert held["h_next"][0] == h[0]
+    assert not held["rejected"][0]
+
+
+def test_the_last_piece_lands_on_the_end_to_the_bit():
+    """t0 + (t1 - t0) misses t1 by a rounding for many t; no second step is made for it."""
+    ends = [(k / 7.0, (k + 1.0) / 3.0) for k in range(200)]
+    assert any(start + (end - start) < end for start, end in ends)
+    for start, end in ends:
+        assert advance(pendulum(), fixed("euler"), start, end, np.array([1.0, 0.0]), {})[2].steps == 1
+
+
 def bouncing(e=0.8):
     """Two balls with gravity; what `correct` does when one passes the floor inside a step."""
     system = FunctionSystem(lambda t, y: [y[2], y[3], -9.81, -9.81], 4, 2, None, False, [0, 1, 0, 1])

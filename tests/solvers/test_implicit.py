@@ -106,6 +106,17 @@ def test_islands_do_not_influence_each_other(solver, linear):
         np.testing.assert_allclose(together[own], alone, rtol=0.0, atol=1e-12)
 
 
+def test_conjugate_gradients_end_for_each_island_on_its_own():
+    """A wild neighbour changes neither the number of iterations of a calm island nor its bits."""
+    system, y = chain(islands=2)
+    y[8:16] *= 30.0
+    solver = ImplicitEuler("cg", "one", cg_tolerance=1e-3)
+    together = solver.step(system, 0.0, y, 0.01, {}).y1
+    own = system.islands == 0
+    alone = solver.step(chain()[0], 0.0, y[own], 0.01, {}).y1
+    assert together[own].tobytes() == alone.tobytes()
+
+
 @pytest.mark.parametrize("linear", ["direct", "cg"])
 @pytest.mark.parametrize("solver", ALL)
 def test_pinned_entries_keep_their_bits(solver, linear):

@@ -15,6 +15,8 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pointmass.description import Described
+
 Array = NDArray[np.floating[Any]]
 Clock = float | Array  # a number, or one for each entry of y
 Memory = dict[str, NDArray[Any]]
@@ -77,7 +79,7 @@ class Step:
     iterations: int = 0
 
 
-class Solver(ABC):
+class Solver(Described, ABC):
     """Advances y by one step. A leaf is numbers and a docstring; the loops are its family's.
 
     Attributes
