@@ -1,0 +1,87 @@
+"""Builders of particles with the forces that hold them together."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ParamSpec
+
+import numpy as np
+
+from pointmass.description import bind
+from pointmass.errors import InvalidInput
+from pointmass.laws.elements import ElementForce
+from pointmass.laws.force import Force
+from pointmass.particles import Particles
+
+P = ParamSpec("P")
+
+
+@dataclass(eq=False)
+class Body:
+    """Particles and the forces between them.
+
+    Attributes
+    ----------
+    particles : with ids 0, 1, 2, ...
+    forces : their ids are those of the particles.
+    kind, arguments : how it was built, to write it as text and build it again.
+    """
+
+    particles: Particles
+    forces: list[Force] = field(default_factory=list)
+    kind: str = ""
+    arguments: dict[str, Any] = field(default_factory=dict)
+
+
+BODIES: dict[str, Callable[..., Body]] = {}
+
+
+def body(build: Callable[P, Body]) -> Callable[P, Body]:
+    """Register a builder under its name; its bodies remember how they were built."""
+
+    @functools.wraps(build)
+    def wrapper(*args: P.args, **kwargs: P.kwargs) -> Body:
+        arguments = bind(build, *args, **kwargs)
+        result = build(*args, **kwargs)
+        result.kind, result.arguments = build.__name__, arguments
+        return result
+
+    wrapper.__signature__ = inspect.signature(build)  # type: ignore[attr-defined]
+    BODIES[build.__name__] = wrapper
+    return wrapper
+
+
+def join(bodies: Sequence[Body], names: Sequence[str], dtype: Any) -> tuple[Particles, list[Force]]:
+    """One set of particles from several bodies, each a group under its name, and all their forces.
+
+    Raises
+    ------
+    InvalidInput
+        Two bodies of one name, or a body's own group that has the name of another's.
+    """
+    if len(set(names)) < len(names):
+        raise InvalidInput(f"bodies need different names, not {', '.join(names)}")
+    attributes = sorted({a for b in bodies for a in b.particles.attributes})
+    whole = Particles(np.zeros((0, 3)), dtype=dtype, **{a: np.zeros(0) for a in attributes})
+    forces: list[Force] = []
+    for name, part in zip(names, bodies, strict=True):
+        p, offset = part.particles, len(whole)
+        whole.add(p.x, p.v, p.m, p.radius, **p.attributes)
+        rows = np.arange(offset, offset + len(p))
+        for group, mask in {name: np.ones(len(p), bool), **p.groups}.items():
+            if group in whole.groups:
+                raise InvalidInput(f"two bodies have a group {group!r}: name one of them otherwise")
+            whole.tag(group, rows[mask])
+        whole.pin(rows[p.pinned])
+        for force in part.forces:
+            forces.append(force.shifted(offset) if isinstance(force, ElementForce) else _limited(force, rows))
+    return whole, forces
+
+
+def _limited(force: Force, rows: Any) -> Force:
+    """A force of one body acts on that body only."""
+    force.on = rows if force.on is None else force.on
+    return force

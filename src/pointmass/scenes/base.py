@@ -1,0 +1,108 @@
+"""What every scene that is shipped with us is: named parameters with units, a scene built from them, a final check."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any, ClassVar
+
+from pointmass.errors import InvalidInput, PointmassError, number, unknown
+from pointmass.frame import Frame
+from pointmass.scene import Scene
+
+
+class CheckFailed(PointmassError):
+    """A scene did not end as its physics says."""
+
+
+def knob(default: Any, summary: str, *, unit: str = "", low: float | None = None, high: float | None = None, choices: Sequence[str] = ()) -> Any:
+    """A parameter of a scene: its default, what it means, its unit, and the values that are allowed."""
+    return field(default=default, metadata={"summary": summary, "unit": unit, "low": low, "high": high, "choices": tuple(choices)})
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShippedScene(ABC):
+    """One phenomenon. A leaf is a frozen dataclass of `knob`s; its docstring's first line says what one sees.
+
+    Raises
+    ------
+    InvalidInput
+        A value that a parameter does not allow.
+    """
+
+    name: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            object.__setattr__(self, f.name, _allowed(f, getattr(self, f.name)))
+
+    @abstractmethod
+    def build(self) -> Scene:
+        """The scene with these parameters."""
+
+    @abstractmethod
+    def check(self, frames: Sequence[Frame]) -> None:
+        """Compare a run with what physics says.
+
+        Raises
+        ------
+        CheckFailed
+            One sentence with the figures.
+        """
+
+    @classmethod
+    def summary(cls) -> str:
+        """One line about the scene."""
+        return (cls.__doc__ or "").strip().splitlines()[0]
+
+    @classmethod
+    def parameters(cls) -> list[dict[str, Any]]:
+        """Its parameters, for lists and forms."""
+        return [
+            {
+                "name": f.name,
+                "default": f.default,
+                "unit": f.metadata["unit"],
+                "minimum": f.metadata["low"],
+                "maximum": f.metadata["high"],
+                "choices": list(f.metadata["choices"]),
+                "summary": f.metadata["summary"],
+            }
+            for f in fields(cls)
+        ]
+
+    @classmethod
+    def with_settings(cls, settings: Mapping[str, Any]) -> ShippedScene:
+        """The scene with some parameters set, given as numbers or as text from a command line."""
+        known = {f.name for f in fields(cls)}
+        for name in settings:
+            if name not in known:
+                raise unknown(f"parameter of scene {cls.name}:", name, known)
+        return cls(**settings)
+
+
+def expect(holds: bool, sentence: str) -> None:
+    """Fail a scene's check with a sentence unless it holds."""
+    if not holds:
+        raise CheckFailed(sentence)
+
+
+def _allowed(f: Any, value: Any) -> Any:
+    assert f.default is not MISSING
+    if f.metadata["choices"]:
+        if value not in f.metadata["choices"]:
+            raise unknown(f"value of {f.name}:", value, f.metadata["choices"])
+        return value
+    if isinstance(f.default, bool):
+        if str(value).lower() not in ("true", "false", "1", "0"):
+            raise InvalidInput(f"{f.name} = {value} is not allowed: it must be true or false")
+        return str(value).lower() in ("true", "1")
+    if isinstance(f.default, str):
+        return str(value)
+    result = number(f.name, value, at_least=f.metadata["low"], at_most=f.metadata["high"], unit=f.metadata["unit"])
+    if isinstance(f.default, int):
+        if result != int(result):
+            raise InvalidInput(f"{f.name} = {value} is not allowed: it must be a whole number")
+        return int(result)
+    return result
