@@ -18,6 +18,7 @@ Vector = NDArray[np.float64]
 MARGIN = 1.12  # the picture is this much larger than what must be seen
 MANY = 1000  # a cloud with more rows than this is measured by its percentiles
 PERCENTILES = (1.0, 99.0)
+FARTHEST = 1e12  # [m]
 NEAR = 0.002  # nearest visible depth, as a fraction of the distance from the eye to the target
 
 
@@ -214,11 +215,11 @@ def _extent(drawable: Drawable, frame: Frame) -> Vector:
 
 
 def _finite(positions: Floats, radius: Floats | float) -> Vector:
-    """Rows (x, y, z, radius) without those that are not finite."""
+    """Rows (x, y, z, radius) without those that are not finite, or hardly."""
     rows = np.empty((len(positions), 4))
     rows[:, :3] = positions
     rows[:, 3] = radius
-    return rows[np.isfinite(rows).all(axis=1)]
+    return rows[(np.abs(rows) < FARTHEST).all(axis=1)]
 
 
 def _robust(rows: Vector, percentiles: bool) -> Vector:

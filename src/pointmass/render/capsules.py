@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from pointmass.errors import InvalidInput
-from pointmass.frame import Arrows, Curves, Floats, Frame, Segments
+from pointmass.frame import Arrows, Curves, Frame, Ints, Segments
 from pointmass.render.camera import View
-from pointmass.render.tables import F64, OPAQUE, Mask, Table, colors, column, corners, named, pixel_box
+from pointmass.render.tables import F64, OPAQUE, Mask, Table, bounded, colors, column, corners, named, pixel_box
 
 COLUMNS = 25
 GLOW_REACH = 2.2  # a glowing line ends at this many radii
@@ -61,8 +61,8 @@ def curves(drawable: Curves, frame: Frame, view: View) -> Table:
 
 def arrows(drawable: Arrows, view: View) -> Table:
     """A shaft and a cone for each arrow."""
-    tails = np.asarray(drawable.vertices, dtype=np.float64).reshape(-1, 3)
-    vectors = np.asarray(drawable.vectors, dtype=np.float64).reshape(-1, 3)
+    tails = bounded(np.asarray(drawable.vertices, dtype=np.float64).reshape(-1, 3))
+    vectors = bounded(np.asarray(drawable.vectors, dtype=np.float64).reshape(-1, 3))
     if len(tails) != len(vectors):
         raise InvalidInput(f"drawable {drawable.name!r} has {len(tails)} tails, but {len(vectors)} vectors")
     radius = 0.5 * column(drawable.width, len(tails), drawable.name)
@@ -91,7 +91,7 @@ def _rows(a: F64, b: F64, ra: F64, rb: F64, ca: F64, cb: F64) -> F64:
     return rows
 
 
-def _table(rows: F64, glow: bool, view: View, curve: Floats | None = None, flat: bool = False) -> Table:
+def _table(rows: F64, glow: bool, view: View, curve: Ints | None = None, flat: bool = False) -> Table:
     """Clipped at the near plane, projected and cut at the joints of `curve`, or flat at the first end."""
     with np.errstate(invalid="ignore"):
         keep = np.isfinite(rows.sum(axis=1)) & (np.maximum(rows[:, 2], rows[:, 5]) > view.near)
@@ -108,7 +108,7 @@ def _table(rows: F64, glow: bool, view: View, curve: Floats | None = None, flat:
         long = length > 1e-4
         rows, whole, a, b, length = rows[long], whole[long], a[long], b[long], length[long]
         radius_a, radius_b = radius_a[long], radius_b[long]
-        _cut_joints(rows, step[long] / length[:, None], np.asarray(curve)[keep][long], whole)
+        _cut_joints(rows, step[long] / length[:, None], curve[keep][long], whole)
     elif flat:
         drawn = length > radius_a  # an arrow that points at the eye shows its head as a disc
         rows[drawn, 20:22] = step[drawn] / length[drawn, None]
@@ -132,7 +132,7 @@ def _clip(rows: F64, near: float) -> Mask:
     return whole
 
 
-def _cut_joints(rows: F64, step: F64, curve: Floats, whole: Mask) -> None:
+def _cut_joints(rows: F64, step: F64, curve: Ints, whole: Mask) -> None:
     """Cut neighbours on a curve along the line that halves their angle, in place."""
     meets = (curve[1:] == curve[:-1]) & whole[1:] & whole[:-1]
     halving = (step[1:] + step[:-1]) * meets[:, None]

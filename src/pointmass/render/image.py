@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from itertools import pairwise
 
@@ -87,6 +88,7 @@ def _light(frame: Frame, camera: Camera, view: View, style: Style) -> tuple[F32,
     map_ = shadow(tables.casters, key_direction(style, view)) if tables.casters else no_shadow()
     from pointmass.render import kernels
 
+    draw: Callable[..., None] = kernels.draw
     height, width = view.height, view.width
     bands = -(-height // kernels.BAND)
     boxes = np.concatenate((faces.box, round_ones.box, lines.box))[:, 2:]
@@ -103,8 +105,11 @@ def _light(frame: Frame, camera: Camera, view: View, style: Style) -> tuple[F32,
 
     def band(i: int) -> None:
         top, bottom = i * kernels.BAND, min((i + 1) * kernels.BAND, height)
-        kernels.draw(
+        samples = (bottom - top) * width * style.samples**2
+        draw(
             top,
+            np.empty(3 * samples, dtype=np.float32),
+            np.zeros(samples, dtype=np.float32),
             light[top:bottom],
             bright[top // 2 : (bottom + 1) // 2],
             background[top:bottom],

@@ -23,7 +23,7 @@ from pointmass.render.balls import MIN_BALL as _MIN_BALL
 from pointmass.render.balls import MIN_GLOW as _MIN_GLOW
 from pointmass.render.capsules import GLOW_REACH as _REACH
 from pointmass.render.capsules import MIN_GLOW as _MIN_LINE
-from pointmass.render.inner import inner
+from pointmass.render.inner import bare, inner
 
 BAND = 16  # rows of a band; even, for the bloom works at half the size
 
@@ -541,7 +541,7 @@ def sort_into_bands(box, bands):
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def draw(
-    top, picture, bright, background, camera, offsets, layered, solids, softs,
+    top, light, depth, picture, bright, background, camera, offsets, layered, solids, softs,
     faces, face_box, balls, ball_box, capsules, capsule_box, lamp, shadow, matrix,
 ):  # fmt: skip
     """Draw the rows of one band, in linear light.
@@ -549,6 +549,7 @@ def draw(
     Parameters
     ----------
     top : the band's first row.
+    light, depth : room to work in: 3 numbers, and 1, for each sample; depth must be zero.
     picture : written, shape (rows, width, 3).
     bright : written; what spills around bright things, of half the size.
     background : colour of each row, shape (rows, 3).
@@ -561,11 +562,12 @@ def draw(
     shadow, matrix : the shadow map.
     """
     bottom = top + picture.shape[0]
-    rows, width = picture.shape[0], picture.shape[1]
+    width = picture.shape[1]
     many = len(solids) > 0 or layered
     samples = offsets.shape[0] if many else 1
-    light = np.empty(rows * width * samples * 3, dtype=np.float32)
-    depth = np.zeros(rows * width * samples, dtype=np.float32)
+    light, depth, camera, offsets, lamp = bare(light), bare(depth), bare(camera), bare(offsets), bare(lamp)
+    faces, balls, capsules, shadow, matrix = bare(faces), bare(balls), bare(capsules), bare(shadow), bare(matrix)
+    face_box, ball_box, capsule_box = bare(face_box), bare(ball_box), bare(capsule_box)
     _background(light, width * samples, background)
     shape = (width, samples, samples)
     capsule_first = len(faces) + len(balls)
@@ -580,25 +582,34 @@ def draw(
         for item in solids if first else softs:
             if item < len(faces):
                 _face(
-                    faces[item], face_box[item], top, bottom, first, light, depth, shape, camera, offsets, lamp, shadow, matrix
-                )
+                    faces[item], face_box[item], top, bottom, first, light, depth, shape,
+                    camera, offsets, lamp, shadow, matrix,
+                )  # fmt: skip
             elif item < capsule_first:
                 i = item - len(faces)
                 if first:
-                    _ball_solid(balls[i], ball_box[i], top, bottom, light, depth, shape, camera, offsets, lamp, shadow, matrix)
+                    _ball_solid(
+                        balls[i], ball_box[i], top, bottom, light, depth, shape,
+                        camera, offsets, lamp, shadow, matrix,
+                    )  # fmt: skip
                 elif balls[i, 8] > ZERO:
                     _ball_glow(balls[i], ball_box[i], top, bottom, solid, light, depth, shape, camera)
                 else:
-                    _ball_soft(balls[i], ball_box[i], top, bottom, solid, light, depth, shape, camera, lamp, shadow, matrix)
+                    _ball_soft(
+                        balls[i], ball_box[i], top, bottom, solid, light, depth, shape,
+                        camera, lamp, shadow, matrix,
+                    )  # fmt: skip
             else:
                 i = item - capsule_first
                 if first:
                     _capsule_solid(
-                        capsules[i], capsule_box[i], top, bottom, light, depth, shape, camera, offsets, lamp, shadow, matrix
-                    )
+                        capsules[i], capsule_box[i], top, bottom, light, depth, shape,
+                        camera, offsets, lamp, shadow, matrix,
+                    )  # fmt: skip
                 else:
                     _capsule_soft(
-                        capsules[i], capsule_box[i], top, bottom, solid, light, depth, shape, camera, lamp, shadow, matrix
-                    )
+                        capsules[i], capsule_box[i], top, bottom, solid, light, depth, shape,
+                        camera, lamp, shadow, matrix,
+                    )  # fmt: skip
     _mean(light, shape[1], picture)
     _spill(picture, bright)

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numba import njit
 
-from pointmass.render.inner import inner
+from pointmass.render.inner import bare, inner
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
@@ -102,6 +102,7 @@ def develop(first, last, image, light, spill, strength, exposure, curve, pattern
     The brightest channel goes through the shoulder and the others keep their ratio to it, so that a bright glow keeps
     its hue; part of the way each channel goes alone, which turns the hottest light towards white as film does.
     """
+    image, light, spill, curve, pattern = bare(image), bare(light), bare(spill), bare(curve), bare(pattern)
     for row in range(first, last):
         for column in range(light.shape[1]):
             r, g, b = light[row, column, 0], light[row, column, 1], light[row, column, 2]

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numba import njit
 
-from pointmass.render.inner import inner
+from pointmass.render.inner import bare, inner
 
 FAR = np.float32(np.inf)
 ZERO = np.float32(0.0)
@@ -76,6 +76,7 @@ def _cast_capsule(depth, r0, r1, ax, ay, az, ra, bx, by, bz, rb):
 @njit(nogil=True, cache=True, error_model="numpy")
 def cast(first, last, depth, faces, balls, capsules):
     """Write the distance to the nearest caster into the rows [first, last) of `depth`; all in texels."""
+    depth, faces, balls, capsules = bare(depth), bare(faces), bare(balls), bare(capsules)
     for row in range(first, last):
         for column in range(depth.shape[1]):
             depth[row, column] = FAR

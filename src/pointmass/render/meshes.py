@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pointmass.frame import Frame, Triangles
+from pointmass.frame import Frame, Ints, Triangles
 from pointmass.render.camera import View
-from pointmass.render.tables import F64, OPAQUE, Table, colors, corners, named, pixel_box
+from pointmass.render.tables import F64, OPAQUE, Mask, Table, colors, corners, named, pixel_box
 
 COLUMNS = 30
 CORNER = 10  # x y z, normal, RGBA of a corner before the projection
@@ -39,25 +39,27 @@ def triangles(drawable: Triangles, frame: Frame, view: View) -> Table:
     return _project(clip(full[keep], view.near), view)
 
 
-def face_normals(places: F64, faces: np.ndarray) -> F64:
+def face_normals(places: F64, faces: Ints) -> F64:
     """Normals with the length of twice the area, shape (k, 3)."""
     a, b, c = places[faces[:, 0]], places[faces[:, 1]], places[faces[:, 2]]
     with np.errstate(invalid="ignore", over="ignore"):
         # The view's axes are left-handed (z away from the eye), so the product is turned round.
-        return np.cross(c - a, b - a)
+        normals: F64 = np.cross(c - a, b - a)
+        return normals
 
 
-def vertex_normals(normals: F64, faces: np.ndarray, count: int) -> F64:
+def vertex_normals(normals: F64, faces: Ints, count: int) -> F64:
     """Unit mean normals of the corners, weighted by area, shape (count, 3)."""
     flat = faces.ravel()
-    sums = np.stack([np.bincount(flat, np.repeat(normals[:, i], 3), count) for i in range(3)], axis=1)
+    sums: F64 = np.stack([np.bincount(flat, np.repeat(normals[:, i], 3), count) for i in range(3)], axis=1)
     return unit(sums)
 
 
 def unit(vectors: F64) -> F64:
     """The same directions with length 1 (0 where there is no direction), shape (n, 3)."""
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        return np.nan_to_num(vectors / np.sqrt((vectors * vectors).sum(axis=1))[:, None])
+        result: F64 = np.nan_to_num(vectors / np.sqrt((vectors * vectors).sum(axis=1))[:, None])
+        return result
 
 
 def clip(full: F64, near: float) -> F64:
@@ -96,5 +98,5 @@ def _project(full: F64, view: View) -> Table:
     rows[:, 9:18] = full[:, :, 3:6].reshape(count, 9)
     rows[:, 18:30] = full[:, :, 6:10].reshape(count, 12)
     box = pixel_box(points.min(axis=1), points.max(axis=1), view.width, view.height)
-    solid = (full[:, :, 9] >= OPAQUE).all(axis=1)
+    solid: Mask = np.all(full[:, :, 9] >= OPAQUE, axis=1)
     return Table(rows, box, full[:, :, 2].mean(axis=1), solid, np.zeros(count, dtype=bool))

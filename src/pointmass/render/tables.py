@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pointmass.errors import InvalidInput
 from pointmass.frame import Drawable, Floats, Frame
+from pointmass.render.camera import FARTHEST
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -62,11 +63,16 @@ def join(tables: list[Table], empty: Table) -> Table:
 
 def corners(drawable: Drawable, frame: Frame) -> F64:
     """The corners that a drawable names, shape (n, 3)."""
-    rows = frame.positions if drawable.vertices is None else drawable.vertices
-    rows = np.asarray(rows, dtype=np.float64)
+    given = frame.positions if drawable.vertices is None else drawable.vertices
+    rows: F64 = np.asarray(given, dtype=np.float64)
     if rows.ndim != 2 or rows.shape[1] != 3:
         raise InvalidInput(f"the corners of drawable {drawable.name!r} must have shape (n, 3), not {rows.shape}")
-    return rows
+    return bounded(rows)
+
+
+def bounded(rows: F64) -> F64:
+    """The same numbers with NaN for what is not finite or so far away that its square would overflow."""
+    return rows if np.abs(rows).max(initial=0.0) < FARTHEST else np.where(np.abs(rows) < FARTHEST, rows, np.nan)
 
 
 def named(rows: F64, index: Any, name: str) -> F64:
@@ -75,7 +81,8 @@ def named(rows: F64, index: Any, name: str) -> F64:
     if index.size and not 0 <= int(index.min()) <= int(index.max()) < len(rows):
         wrong = int(index.min()) if index.min() < 0 else int(index.max())
         raise InvalidInput(f"drawable {name!r} names corner {wrong}, but there are {len(rows)} (0 to {len(rows) - 1})")
-    return rows[index.astype(np.intp, copy=False)]
+    chosen: F64 = rows[index.astype(np.intp, copy=False)]
+    return chosen
 
 
 def column(value: Floats | float, count: int, name: str) -> F64:
@@ -83,7 +90,7 @@ def column(value: Floats | float, count: int, name: str) -> F64:
     array = np.asarray(value, dtype=np.float64)
     if array.shape not in ((), (1,), (count,)):
         raise InvalidInput(f"drawable {name!r} has {count} items, but radii or widths of shape {array.shape}")
-    return np.broadcast_to(array, (count,))
+    return np.broadcast_to(bounded(array), (count,))
 
 
 def colors(value: Floats | tuple[float, ...], count: int, name: str) -> F64:

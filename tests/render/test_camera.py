@@ -1,0 +1,111 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from render_scenes import frame, square
+
+from pointmass.frame import Camera, Points, Segments, Triangles
+from pointmass.render import fit_camera
+from pointmass.render.camera import look
+
+SIZES = st.sampled_from([(1280, 720), (400, 900), (64, 64)])
+CLOUDS = arrays(np.float64, st.tuples(st.integers(1, 40), st.just(3)), elements=st.floats(-1e3, 1e3, width=32))
+
+
+def pixels(camera, size, places):
+    view = look(camera, size)
+    seen = view.see(places)
+    assert (seen[:, 2] > view.near).all()
+    return view.project(seen)
+
+
+def assert_inside(camera, size, places):
+    at = pixels(camera, size, places)
+    assert (at >= -1e-6).all()
+    assert (at <= np.array(size) + 1e-6).all()
+
+
+@given(CLOUDS, SIZES, st.floats(-180, 180), st.floats(-90, 90), st.floats(5, 120))
+@settings(max_examples=150, deadline=None)
+def test_all_points_are_in_view(cloud, size, azimuth, elevation, fov):
+    camera = fit_camera([frame(cloud, Points(name="p"))], Camera(azimuth=azimuth, elevation=elevation, fov=fov), size)
+    assert_inside(camera, size, cloud)
+
+
+@given(CLOUDS, SIZES)
+@settings(max_examples=50, deadline=None)
+def test_all_frames_count(cloud, size):
+    frames = [frame(row[None], Points(name="p")) for row in cloud]
+    assert_inside(fit_camera(frames, size=size), size, cloud)
+
+
+@given(CLOUDS)
+@settings(max_examples=50, deadline=None)
+def test_given_target_stays(cloud):
+    camera = fit_camera([frame(cloud, Points(name="p"))], Camera(target=(1.0, 2.0, 3.0)))
+    assert camera.target == (1.0, 2.0, 3.0)
+    assert_inside(camera, (1280, 720), cloud)
+
+
+def test_given_position_looks_at_the_middle():
+    camera = fit_camera([frame([[0, 0, 0], [2, 0, 0]], Points(name="p"))], Camera(position=(1, 0, 9)))
+    assert camera.target == pytest.approx((1, 0, 0))
+    assert camera.position == (1, 0, 9)
+
+
+def test_a_complete_camera_is_left_alone():
+    camera = Camera(position=(1, 2, 3), target=(0, 0, 0))
+    assert fit_camera([], camera) is camera
+
+
+def test_cloud_fills_the_picture():
+    cloud = np.random.default_rng(1).uniform(-1, 1, (500, 3))
+    at = pixels(fit_camera([frame(cloud, Points(name="p"))]), (1280, 720), cloud)
+    assert np.ptp(at[:, 1]) > 0.75 * 720
+
+
+def test_a_runaway_does_not_shrink_a_large_cloud():
+    cloud = np.random.default_rng(1).uniform(-1, 1, (5000, 3))
+    far = cloud.copy()
+    far[0] = 1e6
+    camera = fit_camera([frame(far, Points(name="p"))])
+    at = pixels(camera, (1280, 720), cloud)
+    assert np.ptp(at[:, 1]) > 0.6 * 720
+
+
+def test_a_huge_floor_does_not_shrink_the_scene():
+    cloud = np.random.default_rng(1).uniform(-1, 1, (50, 3))
+    points = Points(name="p")
+    small = fit_camera([frame(cloud, points)])
+    large = fit_camera([frame(cloud, points, square(1e4))])
+    distances = [np.linalg.norm(np.subtract(c.position, c.target)) for c in (small, large)]
+    assert distances[1] < 1.6 * distances[0]
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        frame(np.zeros((0, 3))),
+        frame([[5, 5, 5]]),
+        frame([[1e-9, 0, 0]], Points(name="p", radius=0.0)),
+        frame([[2, 1, 0]] * 5, Points(name="p")),
+        frame(np.full((3, 3), np.nan), Points(name="p")),
+        frame([[0, 0, 0], [1, 0, 0]], Segments(name="s", pairs=np.array([[0, 1]]))),
+        frame(np.zeros((0, 3)), square(2.0)),
+        frame([[0, 0, 0], [1, 0, 0], [0, 1, 0]], Triangles(name="t", faces=np.array([[0, 1, 2]]))),
+    ],
+)
+def test_scenes_without_extent(scene):
+    view = look(fit_camera([scene]), (64, 64))
+    assert np.isfinite(view.axes).all()
+    assert np.isfinite(view.eye).all()
+
+
+@pytest.mark.parametrize(("azimuth", "elevation"), [(0, 0), (0, 90), (0, -90), (90, 0), (200, 40)])
+def test_direction_of_an_automatic_camera(azimuth, elevation):
+    camera = fit_camera([frame([[0, 0, 0]])], Camera(azimuth=azimuth, elevation=elevation))
+    away = np.subtract(camera.position, camera.target)
+    a, e = np.radians((azimuth, elevation))
+    expected = (np.cos(e) * np.sin(a), np.sin(e), np.cos(e) * np.cos(a))
+    assert away / np.linalg.norm(away) == pytest.approx(expected, abs=1e-9)
