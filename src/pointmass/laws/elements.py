@@ -231,7 +231,7 @@ def spring_force(law: Callable[..., Any]) -> type[ElementForce]:
     Parameters
     ----------
     law : `law(x1, v1, x2, v2, t, *parameters) -> fx, fy, fz`, the force on the first particle [N]; the second takes
-        the opposite. Positions and velocities are tuples of three numbers. It is called once, on symbols.
+        the opposite. Positions and velocities are vectors: x1[0], x1 - x2, k * v1. It is called once, on symbols.
 
     Returns
     -------
@@ -242,9 +242,9 @@ def spring_force(law: Callable[..., Any]) -> type[ElementForce]:
     --------
     >>> @pm.spring_force
     ... def rubber(x1, v1, x2, v2, t, k=50.0, rest=1.0):
-    ...     d = pm.sub(x1, x2)
+    ...     d = x1 - x2
     ...     stretch = pm.maximum(pm.length(d) - rest, 0.0)  # it pulls and never pushes
-    ...     return pm.scale(-k * stretch * pm.inverse(pm.length(d)), d)
+    ...     return -k * stretch * pm.inverse(pm.length(d)) * d
     >>> system = pm.ParticleSystem(particles, forces=[rubber(pairs=[(0, 1), (1, 2)], k=80.0)])
     """
     return element_force(2)(law)

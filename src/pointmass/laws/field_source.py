@@ -48,6 +48,8 @@ class FieldSource:
     ) -> None:
         self.what = what
         self.variables = tuple(variables)
+        if constants is not None and not isinstance(constants, Mapping):
+            raise InvalidInput(f'constants of {what} must be values by name, such as {{"k": 2.0}}, not {constants!r}')
         self.constants = dict(constants or {})
         self.grid = grid
         self.formulas: tuple[Formula, ...] = ()
@@ -81,7 +83,7 @@ class FieldSource:
         for formula in self.formulas:
             known = [*self.variables, *self.constants, *particles.columns]
             for name in sorted(formula.names - set(known)):
-                raise unknown(f"name in {self.what} {formula.shown!r}:", name, [*known, *CONSTANTS, *FUNCTIONS])
+                raise unknown(f"name in {self.what} {formula.shown!r}:", name, {*known, *CONSTANTS, *FUNCTIONS})
 
     def arguments_with(self, arguments: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
         """Arguments of a force with other values: those of constants belong to `constants`."""

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from pointmass.laws.program import Symbol, power, whole_power
+from pointmass.laws.program import Symbol, Vector, power, whole_power
 
 Number = Any  # a float, an array or a Symbol
-Vector = tuple[Number, Number, Number]
+Triple = tuple[Number, ...]  # a Vector, or any three numbers
 
 NUMPY: dict[str, Callable[..., Any]] = {
     "sqrt": np.sqrt,
@@ -117,34 +117,34 @@ def where(condition: Number, a: Number, b: Number) -> Number:
     return operation("where", condition, a, b)
 
 
-def dot(a: Vector, b: Vector) -> Number:
+def dot(a: Triple, b: Triple) -> Number:
     """Scalar product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def cross(a: Vector, b: Vector) -> Vector:
+def cross(a: Triple, b: Triple) -> Vector:
     """Vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    return Vector((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
 
 
-def length(a: Vector) -> Number:
+def length(a: Triple) -> Number:
     """Length of a vector; its derivative at 0 is taken as 0."""
     return sqrt(dot(a, a))
 
 
-def add(a: Vector, b: Vector) -> Vector:
+def add(a: Triple, b: Triple) -> Vector:
     """a + b."""
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+    return Vector((a[0] + b[0], a[1] + b[1], a[2] + b[2]))
 
 
-def sub(a: Vector, b: Vector) -> Vector:
+def sub(a: Triple, b: Triple) -> Vector:
     """a - b."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return Vector((a[0] - b[0], a[1] - b[1], a[2] - b[2]))
 
 
-def scale(s: Number, a: Vector) -> Vector:
+def scale(s: Number, a: Triple) -> Vector:
     """s a."""
-    return s * a[0], s * a[1], s * a[2]
+    return Vector((s * a[0], s * a[1], s * a[2]))
 
 
 def inverse(a: Number) -> Number:

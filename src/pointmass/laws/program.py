@@ -177,6 +177,8 @@ class Symbol:
 
     def apply(self, name: str, *others: Any) -> Symbol:
         """The operation `name` on this symbol and others."""
+        if any(_is_vector(o) for o in others):
+            return NotImplemented  # type: ignore[no-any-return]  # vectors know what to do with a number
         nodes = [self.lift(o) for o in others]
         return Symbol(self.program, self.program.operation(name, self.node, *nodes))
 
@@ -192,8 +194,8 @@ class Symbol:
             return self.program.constant(_float(value))
         if isinstance(value, (tuple, list, np.ndarray)):
             raise InvalidInput(
-                "a law computes with numbers, and a vector is three of them: use pm.scale(k, v), pm.add(a, b) "
-                "or pm.sub(a, b)"
+                "a law computes with numbers, and a vector is three of them: use pm.length(v), pm.dot(a, b) or v[0] "
+                "where a number is wanted"
             )
         raise InvalidInput(f"a law computes with its arguments and numbers, not with {type(value).__name__}")
 
@@ -202,7 +204,7 @@ class Symbol:
         return Symbol(self.program, self.lift(value))
 
     def _flipped(self, name: str, other: Any) -> Symbol:
-        return Symbol(self.program, self.program.operation(name, self.lift(other), self.node))
+        return self.lifted(other).apply(name, self)
 
     def __add__(self, other: Any) -> Symbol:
         return self.apply("add", other)
@@ -303,12 +305,12 @@ class Symbol:
 
     __int__ = __index__ = __float__
 
-    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Symbol:
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         """np.sqrt(x) and its like work on symbols too."""
         function = UFUNCS.get(ufunc.__name__)
         if function is None or method != "__call__" or options:
             raise InvalidInput(f"a law cannot use np.{ufunc.__name__}: known are {', '.join(sorted(UFUNCS))}")
-        return function(*(self.lifted(i) for i in inputs))
+        return elementwise(lambda *parts: function(*(self.lifted(p) for p in parts)), *inputs)
 
 
 UFUNCS: dict[str, Callable[..., Symbol]] = {
@@ -347,6 +349,52 @@ UFUNCS: dict[str, Callable[..., Symbol]] = {
 }
 
 
+class Vector(tuple[Any, ...]):
+    """Three numbers of a law, with the operations of vectors: k * v, a + b, -v; `pm.dot` and `pm.cross` of two."""
+
+    __slots__ = ()
+
+    def __add__(self, other: Any) -> Vector:
+        return Vector(a + b for a, b in zip(self, _three(other), strict=True))
+
+    def __radd__(self, other: Any) -> Vector:
+        return Vector(b + a for a, b in zip(self, _three(other), strict=True))
+
+    def __sub__(self, other: Any) -> Vector:
+        return Vector(a - b for a, b in zip(self, _three(other), strict=True))
+
+    def __rsub__(self, other: Any) -> Vector:
+        return Vector(b - a for a, b in zip(self, _three(other), strict=True))
+
+    def __mul__(self, other: Any) -> Vector:
+        if isinstance(other, (tuple, list)):
+            raise InvalidInput("two vectors are multiplied with pm.dot(a, b) or pm.cross(a, b)")
+        return Vector(a * other for a in self)
+
+    def __rmul__(self, other: Any) -> Vector:
+        return self.__mul__(other)
+
+    def __truediv__(self, other: Any) -> Vector:
+        return Vector(a / other for a in self)
+
+    def __neg__(self) -> Vector:
+        return Vector(-a for a in self)
+
+    def __pos__(self) -> Vector:
+        return self
+
+
+def elementwise(function: Callable[..., Any], *inputs: Any) -> Any:
+    """A function of numbers on arrays of symbols."""
+    arrays = np.broadcast_arrays(*(np.asarray(i, dtype=object) for i in inputs))
+    if arrays[0].ndim == 0:
+        return function(*inputs)
+    result = np.empty(arrays[0].shape, dtype=object)
+    for index in np.ndindex(result.shape):
+        result[index] = function(*(a[index] for a in arrays))
+    return result
+
+
 def whole_power(exponent: float) -> bool:
     """Whether a power is written as a product, which takes a base of any sign."""
     return math.isfinite(exponent) and exponent == int(exponent) and abs(exponent) <= 64
@@ -360,6 +408,16 @@ def power(base: Any, exponent: float) -> Any:
         return base if exponent == 1 else 0.0 * base + 1.0
     half = power(base, exponent // 2)
     return half * half * base if exponent % 2 else half * half
+
+
+def _is_vector(value: Any) -> bool:
+    return isinstance(value, Vector) or (isinstance(value, np.ndarray) and value.ndim > 0)
+
+
+def _three(value: Any) -> Any:
+    if isinstance(value, (tuple, list, np.ndarray)) and len(value) == 3:
+        return value
+    raise InvalidInput("to a vector of a law only another vector, three numbers, can be added")
 
 
 def flatten(value: Any) -> Iterable[Any]:

@@ -9,7 +9,7 @@ from typing import Any
 from pointmass.errors import InvalidInput
 from pointmass.laws.columns import columns
 from pointmass.laws.derivative import jacobian
-from pointmass.laws.program import Program, Symbol, flatten
+from pointmass.laws.program import Program, Symbol, Vector, flatten
 
 AXES = "xyz"
 
@@ -59,7 +59,7 @@ def trace(
 
     Parameters
     ----------
-    law : takes the arguments in order, scalars as numbers and vectors as tuples of three; returns numbers or tuples.
+    law : takes the arguments in order, scalars as numbers and vectors as `Vector`s; returns numbers or tuples.
     arguments : name -> "scalar" or "vector".
     returns : how many numbers the law must return in all; None = any.
     name : for messages.
@@ -76,7 +76,7 @@ def trace(
     for argument, kind in arguments.items():
         names = vector_names(argument) if kind == "vector" else (argument,)
         inputs.extend(names)
-        symbols = tuple(Symbol(program, program.argument(n)) for n in names)
+        symbols = Vector(Symbol(program, program.argument(n)) for n in names)
         values.append(symbols if kind == "vector" else symbols[0])
     if len(set(inputs)) != len(inputs):
         twice = next(n for n in inputs if inputs.count(n) > 1)

@@ -106,8 +106,8 @@ def unary_force(law: Callable[..., Any]) -> type[UnaryForce]:
 
     Parameters
     ----------
-    law : `law(x, v, m, t, *parameters) -> fx, fy, fz` with x [m] and v [m/s] tuples of three numbers, m [kg], t [s].
-        It is called once, on symbols: use `pm.where` for `if`, `pm.sin` for `math.sin`.
+    law : `law(x, v, m, t, *parameters) -> fx, fy, fz` with vectors x [m] and v [m/s] (x[0], -k * v, x + v), m [kg],
+        t [s]. It is called once, on symbols: use `pm.where` for `if`, `pm.sin` for `math.sin`.
 
     Returns
     -------
