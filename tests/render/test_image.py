@@ -241,7 +241,7 @@ def test_what_is_not_finite_or_behind_the_eye_is_left_out():
             Curves(name="d", index=rows, offsets=np.array([0, 6]), width=0.1, glow=True),
             Triangles(name="e", faces=np.array([[0, 1, 2], [0, 3, 4], [0, 4, 5], [0, 0, 0]])),
             Arrows(name="f", vertices=places, vectors=places),
-            Arrows(name="g", vertices=places, vectors=0 * places),
+            Arrows(name="g", vertices=places, vectors=np.zeros_like(places)),
         ),
         camera=FRONT,
         size=SIZE,

@@ -42,6 +42,7 @@ GLOSS_BALL = np.float32(0.40)
 GLOSS_LINE = np.float32(0.12)
 GLOSS_MESH = np.float32(0.06)
 WRAP = np.float32(0.12)  # how far the key light reaches round an edge
+ROUND = np.float32(0.55)  # light from around that reaches a surface seen edge-on: keeps form in the shade
 FALLOFF = np.float32(0.55)  # how much darker a ball or line is where it turns away
 SKIRT = np.float32(0.15)  # strength of a glow's halo
 KNEE = np.float32(1.0)  # light above this spills
@@ -108,6 +109,7 @@ def _shade(x, y, z, nx, ny, nz, r, g, b, gloss, lamp, shadow, matrix):
             shine *= shine
         shine *= gloss * lit
     high = HALF + HALF * (nx * lamp[3] + ny * lamp[4] + nz * lamp[5])
+    around = ROUND + (ONE - ROUND) * facing
     rim = (ONE - facing) * (ONE - facing)
     rim *= rim * lamp[15] * high
     # The light is a pool around the target; beyond it all sinks into the colour of the background.
@@ -115,13 +117,16 @@ def _shade(x, y, z, nx, ny, nz, r, g, b, gloss, lamp, shadow, matrix):
     far = x * x + y * y + z * z
     pool = ONE / (ONE + far * far)
     dim = ONE - pool
+    key_r, key_g, key_b = lamp[6], lamp[7], lamp[8]
+    sky_r, sky_g, sky_b = lamp[9], lamp[10], lamp[11]
+    low_r, low_g, low_b = lamp[12], lamp[13], lamp[14]
+    r *= key * key_r + around * (low_r + high * (sky_r - low_r))
+    g *= key * key_g + around * (low_g + high * (sky_g - low_g))
+    b *= key * key_b + around * (low_b + high * (sky_b - low_b))
     return (
-        pool * (r * (key * lamp[6] + lamp[12] + high * (lamp[9] - lamp[12])) + shine * lamp[6] + rim * lamp[9])
-        + dim * lamp[19],
-        pool * (g * (key * lamp[7] + lamp[13] + high * (lamp[10] - lamp[13])) + shine * lamp[7] + rim * lamp[10])
-        + dim * lamp[20],
-        pool * (b * (key * lamp[8] + lamp[14] + high * (lamp[11] - lamp[14])) + shine * lamp[8] + rim * lamp[11])
-        + dim * lamp[21],
+        pool * (r + shine * key_r + rim * sky_r) + dim * lamp[19],
+        pool * (g + shine * key_g + rim * sky_g) + dim * lamp[20],
+        pool * (b + shine * key_b + rim * sky_b) + dim * lamp[21],
     )
 
 
