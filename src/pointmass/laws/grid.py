@@ -154,8 +154,9 @@ class GridLookup(Primitive):
             case "zero":
                 there = (~((place < 0) | (place > last))).astype(x.dtype)  # NaN stays NaN
                 place = np.clip(place, 0, last)
-        low = np.clip(np.nan_to_num(np.floor(place)), 0, last - 1).astype(np.intp)
-        return _pair(low, (low + 1) % count, place - low, there, step, order)
+        below = np.clip(np.nan_to_num(np.floor(place)), 0, last - 1)
+        low = below.astype(np.intp)
+        return _pair(low, (low + 1) % count, place - below, there, step, order)
 
     def _in_time(self, t: Array) -> Weights:
         """The snapshots before and after."""

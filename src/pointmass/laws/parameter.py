@@ -104,6 +104,11 @@ class Parameter:
         return all(isinstance(c.value, float) for c in self.components)
 
     @property
+    def steady(self) -> bool:
+        """Whether it is the same at all times."""
+        return not any(isinstance(c.value, Traced) and "t" in c.value.depends_on for c in self.components)
+
+    @property
     def common(self) -> bool:
         """Whether it is the same for all particles (a number or a function of t)."""
         return all(isinstance(c.value, float) or (isinstance(c.value, Traced) and not c.needs) for c in self.components)

@@ -100,6 +100,11 @@ class VelocityField(UnaryForce):
     order: ClassVar[int] = 1
     reads: ClassVar[tuple[str, ...]] = ("x", "t")
 
+    @property
+    def steady(self) -> bool:
+        """Whether the field is the same at all times."""
+        return "t" not in self.traced.depends_on and all(p.steady for p in self.parameters.values())
+
 
 def unary_force(law: Callable[..., Any]) -> type[UnaryForce]:
     """Make a force from a law of one particle.

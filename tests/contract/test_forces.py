@@ -1,0 +1,453 @@
+"""What every force in the registry must do, whatever its law. A new force needs an example here, and nothing else."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pointmass.forces import FORCES, Vortex
+from pointmass.laws.elements import ElementForce
+from pointmass.laws.force import Blocks
+from pointmass.laws.grid import Grid
+from pointmass.laws.pairs import PairForce
+from pointmass.particles import Particles
+from pointmass.system import ParticleSystem
+
+sys.path.append(str(Path(__file__).parents[1]))
+import naive  # noqa: E402
+
+N = 6
+TIME = 0.7
+PAIRS = [(0, 1), (1, 2), (4, 2), (5, 0)]
+JOINTS = [(0, 1, 2), (3, 2, 5)]
+RNG = np.random.default_rng(42)
+CELLS = RNG.standard_normal((2, 3, 4, 1, 3))
+CELL_PLACE = {"origin": (-2.0, -3.0, 0.0), "spacing": 1.7, "times": (0.0, 1.0)}
+CHARGE, CIRCULATION = RNG.uniform(-1, 1, N), RNG.uniform(-2, 2, N)
+
+
+@dataclass
+class Example:
+    """A force with the numbers that its parameters have at TIME, for the plain version."""
+
+    arguments: dict[str, Any]
+    numbers: Callable[[int], dict[str, Any]]
+    law: Callable[..., Any]
+    energy: Callable[..., Any] | None = None
+    elements: list[tuple[int, ...]] | None = None
+    pairs: bool = False
+    singular: bool = False  # not finite where particles meet, as its docstring says
+    text: bool = True  # its arguments can stand in a scene file
+
+
+def grid(outside: str) -> Grid:
+    return Grid(CELLS, outside=outside, **CELL_PLACE)
+
+
+def grid_value(outside: str) -> Callable[..., Any]:
+    place = (CELL_PLACE["origin"], CELL_PLACE["spacing"], CELL_PLACE["times"])
+    return lambda x, t: naive.interpolated(CELLS.tolist(), *place, outside, x, t)
+
+
+def saw(x, v, m, t):
+    return [x[0] if x[0] > 0 else -2 * x[1], abs(x[1]) ** 1.5 * math.exp(-t), math.log(2 + x[2] ** 2)]
+
+
+EXAMPLES: dict[str, list[Example]] = {
+    "gravity": [
+        Example({}, lambda i: {"g": (0, -9.81, 0)}, naive.gravity, naive.gravity_energy),
+        Example(
+            {"g": ("sin(t)", "charge", 1.5)},
+            lambda i: {"g": (math.sin(TIME), CHARGE[i], 1.5)},
+            naive.gravity,
+            naive.gravity_energy,
+        ),
+    ],
+    "drag": [
+        Example({"k": 0.3}, lambda i: {"k": 0.3}, naive.drag),
+        Example({"k": "abs(charge) * t"}, lambda i: {"k": abs(CHARGE[i]) * TIME}, naive.drag),
+        Example({"k": [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]}, lambda i: {"k": (i + 1) / 10}, naive.drag),
+    ],
+    "quadratic_drag": [Example({"c": 0.4}, lambda i: {"c": 0.4}, naive.quadratic_drag)],
+    "springs": [
+        Example(
+            {"pairs": PAIRS, "k_s": 3.0, "k_d": 0.7, "rest": [0.5, 1.0, 1.5, 0.0]},
+            lambda e: {"k_s": 3.0, "k_d": 0.7, "rest": (0.5, 1.0, 1.5, 0.0)[e]},
+            naive.spring,
+            naive.spring_energy,
+            elements=PAIRS,
+        ),
+        Example(
+            {"pairs": PAIRS, "k_s": 5.0, "rest": "1 + 0.3*sin(4*t)"},
+            lambda e: {"k_s": 5.0, "k_d": 0.0, "rest": 1 + 0.3 * math.sin(4 * TIME)},
+            naive.spring,
+            naive.spring_energy,
+            elements=PAIRS,
+        ),
+    ],
+    "angles": [
+        Example(
+            {"joints": JOINTS, "k_s": [2.0, 3.0], "k_d": 0.5, "rest": 0.4},
+            lambda e: {"k_s": (2.0, 3.0)[e], "k_d": 0.5, "rest": 0.4},
+            naive.angle,
+            naive.angle_energy,
+            elements=JOINTS,
+        )
+    ],
+    "attractor": [
+        Example(
+            {"mu": 2.0, "center": (0.1, 0.2, -0.1)},
+            lambda i: {"mu": 2.0, "center": (0.1, 0.2, -0.1), "eps": 0.0},
+            naive.attractor,
+            naive.attractor_energy,
+            singular=True,
+        ),
+        Example(
+            {"mu": "t", "center": lambda t: (t, t * t, 0.0), "eps": 0.3},
+            lambda i: {"mu": TIME, "center": (TIME, TIME**2, 0.0), "eps": 0.3},
+            naive.attractor,
+            naive.attractor_energy,
+            text=False,
+        ),
+    ],
+    "harmonic": [
+        Example(
+            {"k_s": 4.0, "center": ("cos(t)", 0, 1), "k_d": 0.2},
+            lambda i: {"k_s": 4.0, "center": (math.cos(TIME), 0, 1), "k_d": 0.2},
+            naive.harmonic,
+            naive.harmonic_energy,
+        )
+    ],
+    "gravitation": [
+        Example(
+            {"G": 0.7},
+            lambda i: {"G": 0.7, "eps": 0.0},
+            naive.gravitation,
+            naive.gravitation_energy,
+            pairs=True,
+            singular=True,
+        ),
+        Example(
+            {"G": "1 + t", "eps": 0.2},
+            lambda i: {"G": 1 + TIME, "eps": 0.2},
+            naive.gravitation,
+            naive.gravitation_energy,
+            pairs=True,
+        ),
+    ],
+    "vortex": [
+        Example(
+            {"circulation": 2.0, "axis": (1, 2, 2), "center": ("t", 0, 0), "eps": 0.1},
+            lambda i: {"circulation": 2.0, "axis": (1, 2, 2), "center": (TIME, 0, 0), "eps": 0.1},
+            naive.vortex,
+        ),
+        Example(
+            {"circulation": "sin(t)", "eps": 0.0},
+            lambda i: {"circulation": math.sin(TIME), "axis": (0, 0, 1), "center": (0, 0, 0), "eps": 0.0},
+            naive.vortex,
+        ),
+    ],
+    "point_vortices": [
+        Example(
+            {"eps": 0.1}, lambda i: {"circulation": CIRCULATION[i], "eps": 0.1}, naive.point_vortices, pairs=True
+        ),
+        Example(
+            {"circulation": "circulation * t"},
+            lambda i: {"circulation": CIRCULATION[i] * TIME, "eps": 0.0},
+            naive.point_vortices,
+            pairs=True,
+        ),
+    ],
+    "wind": [
+        Example({"k": 0.3}, lambda i: {"k": 0.3, "air": lambda x, t: [3.0, 0.0, 0.0]}, naive.wind),
+        Example(
+            {"velocity": Vortex("1 + t", center=("t", 0, 0), eps=0.2), "k": "abs(charge)"},
+            lambda i: {
+                "k": abs(CHARGE[i]),
+                "air": lambda x, t: naive.vortex(x, None, 1, t, 1 + t, (t, 0, 0), (0, 0, 1), 0.2),
+            },
+            naive.wind,
+            text=False,
+        ),
+    ],
+    "field": [
+        Example(
+            {"force": ("-k*x + charge*vy", "sin(t)*y", "m"), "constants": {"k": 2.0}},
+            lambda i: {"function": lambda x, v, m, t: [-2 * x[0] + CHARGE[i] * v[1], math.sin(t) * x[1], m]},
+            naive.formula,
+        ),
+        Example(
+            {"force": ("x if x > 0 else -2*y", "abs(y)**1.5*exp(-t)", "log(2 + z**2)")},
+            lambda i: {"function": saw},
+            naive.formula,
+        ),
+        Example(
+            {"potential": "0.5*k*(x**2 + y*z) + m*9.81*y", "constants": {"k": "1 + t"}},
+            lambda i: {
+                "function": lambda x, v, m, t: [
+                    -(1 + t) * x[0],
+                    -0.5 * (1 + t) * x[2] - 9.81 * m,
+                    -0.5 * (1 + t) * x[1],
+                ],
+                "energy": lambda x, v, m, t: 0.5 * (1 + t) * (x[0] ** 2 + x[1] * x[2]) + m * 9.81 * x[1],
+            },
+            lambda x, v, m, t, function, energy: naive.formula(x, v, m, t, function),
+            naive.formula_energy,
+        ),
+        Example(
+            {"grid": grid("clamp"), "scale": "1 + t"},
+            lambda i: {"function": lambda x, v, m, t: naive.scale(1 + t, grid_value("clamp")(x, t))},
+            naive.formula,
+            text=False,
+        ),
+    ],
+    "flow": [
+        Example(
+            {"velocity": ("-W*y", "W*x", "charge"), "constants": {"W": 2.0}},
+            lambda i: {"function": lambda x, v, m, t: [-2 * x[1], 2 * x[0], CHARGE[i]]},
+            naive.formula,
+        ),
+        *(
+            Example(
+                {"grid": grid(outside)},
+                lambda i, o=outside: {"function": lambda x, v, m, t: grid_value(o)(x, t)},
+                naive.formula,
+                text=False,
+            )
+            for outside in ("zero", "wrap")
+        ),
+    ],
+    "magnetic": [
+        Example({"B": (0.1, "t", 2.0)}, lambda i: {"B": (0.1, TIME, 2.0), "q": CHARGE[i]}, naive.magnetic),
+    ],
+}
+CASES = [pytest.param(n, e, id=f"{n}-{k}") for n, examples in EXAMPLES.items() for k, e in enumerate(examples)]
+every = pytest.mark.parametrize(("name", "example"), CASES)
+
+
+def particles(dtype: Any = np.float64) -> Particles:
+    rng = np.random.default_rng(7)
+    x, v, m = rng.standard_normal((N, 3)), rng.standard_normal((N, 3)), rng.uniform(0.5, 2, N)
+    return Particles(x, v, m, charge=CHARGE, circulation=CIRCULATION, dtype=dtype)
+
+
+def make(name: str, example: Example, **more: Any) -> Any:
+    return FORCES[name](**example.arguments, **more)
+
+
+def evaluate(force: Any, p: Particles, x: Any = None, v: Any = None, t: float = TIME) -> Any:
+    force.bind(p)
+    f = np.zeros_like(p.x)
+    force.add_forces(p, t, p.x if x is None else x, p.v if v is None else v, f)
+    return f
+
+
+def expected(example: Example, p: Particles) -> Any:
+    state = SimpleNamespace(x=p.x.tolist(), v=p.v.tolist(), m=p.m.tolist(), t=TIME)
+    if example.elements is not None:
+        return np.array(naive.over_elements(example.law, example.elements, state, example.numbers))
+    return np.array((naive.over_pairs if example.pairs else naive.over_particles)(example.law, state, example.numbers))
+
+
+def expected_energy(example: Example, p: Particles) -> float:
+    x, v, m = p.x.tolist(), p.v.tolist(), p.m.tolist()
+    numbers, law = example.numbers, example.energy
+    if example.elements is not None:
+        return sum(law([x[i] for i in nodes], **numbers(e)) for e, nodes in enumerate(example.elements))
+    if example.pairs:
+        return sum(law(x[i], m[i], numbers(i), x[j], m[j], numbers(j)) for i in range(N) for j in range(i))
+    return sum(law(x[i], v[i], m[i], TIME, **numbers(i)) for i in range(N))
+
+
+def test_every_force_of_the_registry_has_an_example():
+    assert set(EXAMPLES) == set(FORCES)
+    assert all(FORCES[name](**examples[0].arguments).name == name for name, examples in EXAMPLES.items())
+
+
+@every
+@pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 1e-12), (np.float32, 1e-5)])
+def test_equals_the_plain_version(name, example, dtype, tolerance):
+    p = particles(dtype)
+    f = evaluate(make(name, example), p)
+    want = expected(example, p)
+    assert f.dtype == dtype
+    np.testing.assert_allclose(f, want, rtol=0, atol=tolerance * np.abs(want).max())
+
+
+@every
+def test_energy_equals_the_plain_version(name, example):
+    p = particles()
+    force = make(name, example)
+    force.bind(p)
+    energy = force.energy(p, TIME, p.x, p.v)
+    if example.energy is None:
+        assert energy is None
+    else:
+        assert energy == pytest.approx(expected_energy(example, p), rel=1e-12)
+
+
+@every
+def test_force_is_minus_the_gradient_of_its_energy(name, example):
+    if example.energy is None:
+        pytest.skip("it has no energy")
+    p = particles()
+    p.v[:] = 0
+    force = make(name, example)
+    f = evaluate(force, p)
+    h = 1e-5
+    slope = np.zeros_like(p.x)
+    for i, axis in np.ndindex(*p.x.shape):
+        up, down = p.x.copy(), p.x.copy()
+        up[i, axis] += h
+        down[i, axis] -= h
+        slope[i, axis] = (force.energy(p, TIME, up, p.v) - force.energy(p, TIME, down, p.v)) / (2 * h)
+    np.testing.assert_allclose(f, -slope, atol=1e-6 * max(1.0, np.abs(f).max()), rtol=0)
+
+
+@every
+def test_jacobian_equals_finite_differences(name, example):
+    p = particles()
+    force = make(name, example)
+    force.bind(p)
+    blocks = Blocks()
+    force.add_jacobian(p, TIME, p.x, p.v, blocks)
+    h = 1e-6
+    for exact, which in zip(blocks.matrices(N), "xv", strict=True):
+        slope = np.zeros((3 * N, 3 * N))
+        for column in range(3 * N):
+            state = {"x": [p.x.copy(), p.x.copy()], "v": [p.v.copy(), p.v.copy()]}
+            state[which][0].ravel()[column] += h
+            state[which][1].ravel()[column] -= h
+            up, down = (evaluate(force, p, state["x"][k], state["v"][k]) for k in (0, 1))
+            slope[:, column] = (up - down).ravel() / (2 * h)
+        np.testing.assert_allclose(exact.toarray(), slope, rtol=0, atol=1e-6 * max(1.0, np.abs(slope).max()))
+
+
+@every
+def test_adds_and_leaves_the_state_alone(name, example):
+    p = particles()
+    force = make(name, example)
+    x, v, m = p.x.copy(), p.v.copy(), p.m.copy()
+    alone = evaluate(force, p)
+    f = np.full_like(p.x, 7.0)
+    force.add_forces(p, TIME, p.x, p.v, f)
+    np.testing.assert_allclose(f - 7.0, alone, rtol=0, atol=1e-13 * max(7.0, np.abs(alone).max()))
+    assert (p.x == x).all()
+    assert (p.v == v).all()
+    assert (p.m == m).all()
+
+
+@every
+def test_the_same_bits_twice(name, example):
+    p = particles()
+    force, again = make(name, example), make(name, example)
+    assert (evaluate(force, p) == evaluate(force, p)).all()
+    assert (evaluate(force, p) == evaluate(again, p)).all()
+
+
+@every
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_no_operation_leaves_the_precision(name, example, dtype):
+    force = make(name, example)
+    force.bind(particles(dtype))
+    inputs = [np.linspace(0.1, 0.9, 5).astype(dtype) + k / 7 for k, _ in enumerate(force.traced.inputs)]
+    inputs = [i.astype(dtype) for i in inputs]
+    for output in force.traced.columns(*inputs):
+        assert isinstance(output, float) or output.dtype == dtype
+
+
+@every
+def test_finite_where_particles_meet(name, example):
+    p = particles()
+    p.x[:] = 0.1, 0.2, -0.1
+    p.v[:] = 0
+    f = evaluate(make(name, example), p)
+    assert np.isfinite(f).all() != example.singular
+    if example.singular:
+        assert "singular" in FORCES[name].__doc__
+
+
+@every
+def test_action_and_reaction(name, example):
+    if not FORCES[name].internal:
+        pytest.skip("it acts from outside")
+    p = particles()
+    f = evaluate(make(name, example), p)
+    size = np.abs(f).sum()
+    assert np.abs(f.sum(axis=0)).max() < 1e-12 * size
+    assert np.abs(np.cross(p.x, f).sum(axis=0)).max() < 1e-12 * size
+
+
+@every
+def test_selections(name, example):
+    p = particles()
+    p.tag("some", [0, 2])
+    if issubclass(FORCES[name], ElementForce):
+        pytest.skip("its elements are its selection")
+    forces = [evaluate(make(name, example, on=on), p) for on in ([0, 2], [-N, 2], p.groups["some"], "some")]
+    assert all((f == forces[0]).all() for f in forces)
+    assert (forces[0][[1, 3, 4, 5]] == 0).all()
+    if not issubclass(FORCES[name], PairForce):
+        np.testing.assert_array_equal(forces[0][[0, 2]], evaluate(make(name, example), p)[[0, 2]])
+    assert (evaluate(make(name, example, on=[]), p) == 0).all()
+
+
+@every
+def test_switched_off(name, example):
+    force = make(name, example)
+    system = ParticleSystem(particles(), [force])
+    on = system.deriv_eval(TIME)
+    force.enabled = False
+    off = system.deriv_eval(TIME)
+    assert not (on == off).all()
+    assert (off == (np.concatenate([system.particles.v.ravel(), np.zeros(3 * N)]) if force.order == 2 else 0)).all()
+    assert ParticleSystem(particles(), [make(name, example, enabled=False)]).energy().potential == 0
+
+
+@every
+def test_clocks_of_their_own(name, example):
+    p = particles()
+    force = make(name, example)
+    common = evaluate(force, p)
+    own = np.zeros_like(p.x)
+    force.add_forces(p, np.full(N, TIME), p.x, p.v, own)
+    np.testing.assert_allclose(own, common, rtol=0, atol=1e-15 * np.abs(common).max())
+
+
+@every
+def test_without_particles_and_after_their_birth(name, example):
+    if any(isinstance(a, list) for a in example.arguments.values()):
+        pytest.skip("it names particles")
+    empty = Particles(np.zeros((0, 3)), charge=0.0, circulation=0.0)
+    system = ParticleSystem(empty, [make(name, example)])
+    assert system.deriv_eval(TIME).shape == (0,)
+    p = particles()
+    system.add(p.x, p.v, m=p.m, charge=CHARGE, circulation=CIRCULATION)
+    f = np.zeros((N, 3))
+    system.forces[0].add_forces(system.particles, TIME, p.x, p.v, f)
+    np.testing.assert_array_equal(f, evaluate(make(name, example), p))
+
+
+def writable(value: Any) -> bool:
+    if isinstance(value, dict):
+        return all(isinstance(k, str) and writable(v) for k, v in value.items())
+    if isinstance(value, (list, tuple)):
+        return all(writable(v) for v in value)
+    return isinstance(value, (bool, int, float, str))
+
+
+@every
+def test_made_again_from_its_arguments(name, example):
+    p = particles()
+    force = make(name, example)
+    again = type(force)(**force.arguments)
+    assert (evaluate(force, p) == evaluate(again, p)).all()
+    assert writable(force.arguments) == example.text
