@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.collisions.collider import Collider
-from pointmass.errors import InvalidInput, number, unknown, whole_number
+from pointmass.errors import InvalidInput, finite_array, number, unknown, whole_number
 from pointmass.forces.springs import Springs
 from pointmass.frame import Arrows, Curves, Drawable, Points, Segments, Triangles
-from pointmass.particles import Array
-from pointmass.solvers import RK4
+from pointmass.laws.unary import VelocityField
+from pointmass.particles import Array, Particles
+from pointmass.solvers import FunctionSystem, Midpoint
 from pointmass.system import ParticleSystem
 
 PALETTES = {  # sRGB anchors from low to high
@@ -23,6 +24,7 @@ PALETTES = {  # sRGB anchors from low to high
     "spectrum": ("#5465ff", "#2ec4b6", "#9be15d", "#ffd23f", "#ff5d5d"),
     "aurora": ("#16324f", "#18a999", "#7ae582", "#f6f740", "#ff6f91"),
 }
+CURVE_STEPS = 60
 FAMILY_COLORS = {"stretch": "#5fa8ff", "shear": "#5fe3a1", "bend": "#ff6b6b"}  # as on the lecture's cloth slide
 
 
@@ -44,6 +46,7 @@ class Look:
     trails : length of the particles' trails [s], 0 = none.
     arrows : arrows of a flow along the longest side, 0 = none.
     streamlines : integral curves of a flow, 0 = none.
+    field_box : corners of the box in which arrows and integral curves are drawn [m]; None = that of the particles at the start.
     colliders : whether surfaces are drawn, in `collider_color`.
     floor_size : edge of the part of an infinite plane that is drawn [m]; None = 3 times the scene.
     """
@@ -61,6 +64,7 @@ class Look:
     trails: float = 0.0
     arrows: int = 0
     streamlines: int = 0
+    field_box: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
     colliders: bool = True
     collider_color: str = "#5b6678"
     floor_size: float | None = None
@@ -78,6 +82,8 @@ class Look:
                 number(f"look.{name}", getattr(self, name), above=0, unit="m")
         number("look.brightness", self.brightness, at_least=0)
         number("look.trails", self.trails, at_least=0, unit="s")
+        if self.field_box is not None:
+            finite_array("look.field_box", self.field_box, (2, 3))
         for name in ("arrows", "streamlines"):
             whole_number(f"look.{name}", getattr(self, name), at_least=0)
 
@@ -86,20 +92,20 @@ class Look:
         return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) != f.default}
 
     def drawables(
-        self, system: ParticleSystem, t: float, x: Array, v: Array, frame: int, trails: Trails
+        self, system: ParticleSystem, t: float, x: Array, v: Array, frame: int, stage: Stage
     ) -> tuple[Drawable, ...]:
         """Everything that a frame shows, for the system at (t, x, v)."""
-        extent = _extent(x)
+        extent = stage.extent
         colors = self._colors(system, x, v)
         result: list[Drawable] = []
         if self.colliders:
             result += [self._collider(c, k, t, extent, frame) for k, c in enumerate(system.colliders)]
         if system.order == 1 and (self.arrows or self.streamlines):
-            result += self._field(system, t, x, frame)
+            result += self._field(system, t, stage, frame)
         if self.springs:
             result += self._springs(system, extent)
         if self.trails > 0:
-            result += trails.drawn(self, system.particles.id, colors, extent, frame)
+            result += stage.trails.drawn(self, system.particles.id, colors, extent, frame)
         if self.particles != "none" and len(x):
             own = system.particles.radius
             radius = np.float32(self.size) if self.size else np.where(own > 0, own, 0.01 * extent).astype(np.float32)
@@ -150,9 +156,9 @@ class Look:
                 )
         return result
 
-    def _field(self, system: ParticleSystem, t: float, x: Array, frame: int) -> list[Drawable]:
-        low, high = _bounds(x)
-        steady = not any("t" in getattr(f, "traced").depends_on for f in system.forces if hasattr(f, "traced"))
+    def _field(self, system: ParticleSystem, t: float, stage: Stage, frame: int) -> list[Drawable]:
+        low, high = stage.low, stage.high
+        steady = all(isinstance(f, VelocityField) and f.steady for f in system.forces)
         version = 0 if steady else frame
         result: list[Drawable] = []
         if self.arrows:
@@ -160,6 +166,22 @@ class Look:
         if self.streamlines:
             result.append(_streamlines(system, t, low, high, self.streamlines, version))
         return result
+
+
+class Stage:
+    """What looks at one run have in common.
+
+    Attributes
+    ----------
+    low, high : corners of the box in which fields are drawn [m].
+    extent : size of the scene [m]; lines and small particles are drawn in proportion to it.
+    trails : where the particles were.
+    """
+
+    def __init__(self, look: Look, x: Array) -> None:
+        self.low, self.high = _bounds(x) if look.field_box is None else np.array(look.field_box, np.float64)
+        self.extent = _extent(x)
+        self.trails = Trails(look)
 
 
 class Trails:
@@ -231,12 +253,11 @@ def palette(name: str, level: Array, brightness: float = 1.0) -> NDArray[np.floa
 
 
 def _bounds(x: Array) -> tuple[Array, Array]:
-    if not len(x):
-        return -np.ones(3), np.ones(3)
-    low, high = x.min(axis=0), x.max(axis=0)
-    margin = 0.1 * max(float((high - low).max()), 1e-6)
-    flat = (high - low) < 1e-9
-    return np.where(flat, low, low - margin), np.where(flat, high, high + margin)
+    """Corners of the box of the particles; a box of no size is 2 m wide."""
+    low, high = (x.min(axis=0), x.max(axis=0)) if len(x) else (np.zeros(3), np.zeros(3))
+    if not (high > low).any():
+        low, high = low - (1, 1, 0), high + (1, 1, 0)
+    return low.astype(np.float64), high.astype(np.float64)
 
 
 def _extent(x: Array) -> float:
@@ -247,16 +268,19 @@ def _extent(x: Array) -> float:
     return max(float((high - low).max()), 1e-3)
 
 
-def _velocity(system: ParticleSystem, t: float, points: Array) -> Array:
-    """The flow at any points, shape (k, 3)."""
-    from pointmass.particles import Particles
+class _Probe:
+    """The flow of a system at points of our own choice."""
 
-    probe = Particles(points, dtype=system.particles.dtype)
-    total = np.zeros_like(probe.x)
-    for force in system.forces:
-        if force.enabled and force.on is None:
-            force.add_forces(probe, t, probe.x, probe.v, total)
-    return np.where(np.isfinite(total), total, 0)
+    def __init__(self, system: ParticleSystem, points: Array) -> None:
+        self.fields = [f for f in system.forces if f.enabled and f.on is None]
+        self.particles = Particles(points)
+
+    def velocity(self, t: float, points: Array) -> Array:
+        """Velocities [m/s], shape (k, 3); 0 where the field is not finite."""
+        total = np.zeros_like(points)
+        for field in self.fields:
+            field.add_forces(self.particles, t, points, self.particles.v, total)
+        return np.where(np.isfinite(total), total, 0)
 
 
 def _grid(low: Array, high: Array, count: int) -> Array:
@@ -267,7 +291,7 @@ def _grid(low: Array, high: Array, count: int) -> Array:
 
 def _field_arrows(system: ParticleSystem, t: float, low: Array, high: Array, count: int, version: int) -> Arrows:
     tails = _grid(low, high, count)
-    flow = _velocity(system, t, tails)
+    flow = _Probe(system, tails).velocity(t, tails)
     speed = np.sqrt((flow * flow).sum(axis=1))
     step = float((high - low).max()) / count
     top = float(np.percentile(speed, 95)) if len(speed) else 0.0
@@ -279,33 +303,29 @@ def _field_arrows(system: ParticleSystem, t: float, low: Array, high: Array, cou
         version=version,
         vertices=(tails - 0.5 * vectors).astype(np.float32),
         vectors=vectors.astype(np.float32),
-        width=np.float32(0.07 * step),
+        width=0.07 * step,
         color=color,
     )
 
 
 def _streamlines(system: ParticleSystem, t: float, low: Array, high: Array, count: int, version: int) -> Curves:
-    """Integral curves of the field frozen at t, by RK4 with steps along the curve, from evenly spread seeds."""
-    side = max(2, round(count ** (1 / max(1, int((high > low).sum())))))
-    x = _grid(low, high, side)[:count]
-    step = 0.01 * float((high - low).max())
-    steps = 120
-    path = [x]
-    tableau = RK4
+    """Integral curves of the field frozen at t: midpoint steps of equal length from evenly spread seeds."""
+    side = float(np.prod((high - low)[high > low]) / count) ** (1 / max(1, int((high > low).sum())))
+    x = _grid(low, high, max(1, round(float((high - low).max()) / side)))
+    step = 0.6 * float((high - low).max()) / CURVE_STEPS
+    probe = _Probe(system, x)
 
-    def unit_flow(points: Array) -> Array:
-        flow = _velocity(system, t, points)
+    def unit_flow(_t: Any, y: Array) -> Array:
+        flow = probe.velocity(t, y.reshape(-1, 3))
         size = np.sqrt((flow * flow).sum(axis=1))[:, None]
-        return flow / np.where(size > 1e-12, size, 1) * (size > 1e-12)
+        return np.asarray(np.where(size > 1e-12, flow / np.where(size > 1e-12, size, 1), 0)).ravel()
 
-    from pointmass.solvers import FunctionSystem
-
-    k = len(x)
-    curve = FunctionSystem(lambda s, y: unit_flow(y.reshape(k, 3)).ravel(), 3 * k)
-    for _ in range(steps):
-        path.append(tableau().step(curve, 0.0, path[-1].ravel(), step, {}).y1.reshape(k, 3))
-    points = np.stack(path, axis=1)
-    inside = ((points >= low - step) & (points <= high + step)).all(axis=2)
+    curve, solver = FunctionSystem(unit_flow, x.size), Midpoint()
+    path = [x.ravel()]
+    for _ in range(CURVE_STEPS):
+        path.append(solver.step(curve, 0.0, path[-1], step, {}).y1)
+    points = np.stack(path).reshape(len(path), -1, 3).transpose(1, 0, 2)
+    inside = ((points >= low - 1e-9) & (points <= high + 1e-9)).all(axis=2)
     length = np.where(inside.all(axis=1), points.shape[1], np.argmin(inside, axis=1))
     keep = np.arange(points.shape[1])[None, :] < length[:, None]
     return Curves(
@@ -314,6 +334,6 @@ def _streamlines(system: ParticleSystem, t: float, low: Array, high: Array, coun
         vertices=points[keep].astype(np.float32),
         index=np.arange(int(keep.sum()), dtype=np.int32),
         offsets=np.concatenate([[0], np.cumsum(length)]).astype(np.int32),
-        width=np.float32(0.25 * step),
+        width=0.15 * step,
         color=linear("#3d6d8f"),
     )

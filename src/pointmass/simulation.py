@@ -12,7 +12,7 @@ from pointmass.emitters.emitter import Emitter
 from pointmass.engine.reference import ReferenceEngine
 from pointmass.errors import Diverged, InvalidInput, number, whole_number
 from pointmass.frame import Frame
-from pointmass.look import Look, Trails
+from pointmass.look import Look, Stage
 from pointmass.particles import Array
 from pointmass.solvers import RK4, SymplecticEuler
 from pointmass.solvers.base import Solver
@@ -79,7 +79,7 @@ class Simulation:
         self.frames_seen = 0
         self.engine = ReferenceEngine(system, solver)
         self._start = system.get_state()
-        self._trails = Trails(self.look)
+        self._stage = Stage(self.look, system.particles.x)
         self._lifetimes: dict[int, float] = {}
         self._speed_limit = RUNAWAY * self._natural_speed()
 
@@ -126,8 +126,8 @@ class Simulation:
         x, v = p.x, p.v
         if t is not None and t < self.t:
             x, v = system.split(self.engine.state_at(t))
-        self._trails.remember(now, p.id, x)
-        drawables = self.look.drawables(system, now, x, v, number, self._trails)
+        self._stage.trails.remember(now, p.id, x)
+        drawables = self.look.drawables(system, now, x, v, number, self._stage)
         return Frame(
             number=number,
             time=now,

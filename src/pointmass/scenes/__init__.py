@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 from pointmass.scenes.base import CheckFailed, ShippedScene
+from pointmass.scenes.bounce import Bounce
+from pointmass.scenes.flow import FlowScene
+from pointmass.scenes.fountain import Fountain
+from pointmass.scenes.orbit import Orbit
 from pointmass.scenes.pendulum import Pendulum
+from pointmass.scenes.springs import SpringsScene
 
-SCENES: dict[str, type[ShippedScene]] = {scene.name: scene for scene in (Pendulum,)}
+SCENES: dict[str, type[ShippedScene]] = {
+    scene.name: scene for scene in (Pendulum, Bounce, FlowScene, Orbit, SpringsScene, Fountain)
+}
 
 __all__ = ["SCENES", "CheckFailed", "ShippedScene"]

@@ -1,0 +1,75 @@
+"""A cube of jelly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pointmass.bodies import lattice
+from pointmass.collisions import Plane
+from pointmass.forces import Drag, Gravity
+from pointmass.frame import Camera, Frame
+from pointmass.look import Look
+from pointmass.scene import Scene
+from pointmass.scenes.base import ShippedScene, expect, knob
+from pointmass.solvers import SymplecticEuler
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringsScene(ShippedScene):
+    """A cube of masses and springs drops on a corner, bounces and wobbles to rest."""
+
+    name = "springs"
+
+    side: int = knob(5, "particles along each edge", low=2, high=40)
+    size: float = knob(1.0, "edge of the cube", unit="m", low=0.01, high=100)
+    mass: float = knob(1.0, "mass of the cube", unit="kg", low=1e-6, high=1e6)
+    stiffness: float = knob(150.0, "stiffness of an edge spring", unit="N/m", low=0.1, high=1e7)
+    damping_ratio: float = knob(0.04, "damping of a spring, 1 = critical", low=0, high=5)
+    height: float = knob(1.7, "height of its centre at the start", unit="m", low=0, high=1000)
+    tilt: float = knob(40.0, "how far it is turned", unit="degrees", low=-180, high=180)
+    restitution: float = knob(0.4, "of the floor", low=0, high=1)
+    friction: float = knob(0.6, "of the floor", low=0, high=10)
+    drag: float = knob(0.0005, "air drag on each mass", unit="N s/m", low=0, high=10)
+    gravity: float = knob(9.81, "gravity, downwards", unit="m/s^2", low=0, high=1000)
+
+    def build(self) -> Scene:
+        """The cube above a floor."""
+        m = self.mass / self.side**3
+        fastest = math.sqrt(2 * 16 * self.stiffness / m)  # 6 edge springs and 20 diagonals of half the stiffness
+        return Scene(
+            name=self.name,
+            summary=self.summary(),
+            dt=1 / 60 / max(4, math.ceil(fastest / 60 / (1.6 - self.damping_ratio))),
+            frames=300,
+            solver=SymplecticEuler(),
+            bodies=[
+                lattice(
+                    (self.side,) * 3,
+                    (self.size,) * 3,
+                    center=(0.0, self.height, 0.0),
+                    tilt=self.tilt,
+                    mass=self.mass,
+                    k_s=self.stiffness,
+                    damping_ratio=self.damping_ratio,
+                    radius=0.18 * self.size / self.side,
+                )
+            ],
+            forces=[Gravity((0.0, -self.gravity, 0.0)), Drag(self.drag)],
+            colliders=[Plane(restitution=self.restitution, friction=self.friction)],
+            camera=Camera(azimuth=28.0, elevation=14.0),
+            look=Look(color="#ffc46b", spring_width=0.012 * self.size, floor_size=60 * self.size),
+        )
+
+    def check(self, frames: Sequence[Frame]) -> None:
+        """It stays on its floor, keeps its shape and ends with less energy than it had."""
+        last = frames[-1]
+        lowest = min(float(f.positions[:, 1].min()) for f in frames)
+        expect(lowest >= -1e-9, f"the cube sank {-lowest:.2g} m into the floor")
+        lost = frames[0].quantities["energy"] - last.quantities["energy"]
+        expect(lost >= -1e-6, f"the cube gained {-lost:.2g} J")
+        spread = float(np.ptp(last.positions, axis=0).max())
+        expect(0.5 * self.size < spread < 2.2 * self.size, f"the cube of {self.size} m is now {spread:.2f} m wide")
