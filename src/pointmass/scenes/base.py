@@ -16,9 +16,20 @@ class CheckFailed(PointmassError):
     """A scene did not end as its physics says."""
 
 
-def knob(default: Any, summary: str, *, unit: str = "", low: float | None = None, high: float | None = None, choices: Sequence[str] = ()) -> Any:
+def knob(
+    default: Any,
+    summary: str,
+    *,
+    unit: str = "",
+    low: float | None = None,
+    high: float | None = None,
+    choices: Sequence[str] = (),
+) -> Any:
     """A parameter of a scene: its default, what it means, its unit, and the values that are allowed."""
-    return field(default=default, metadata={"summary": summary, "unit": unit, "low": low, "high": high, "choices": tuple(choices)})
+    return field(
+        default=default,
+        metadata={"summary": summary, "unit": unit, "low": low, "high": high, "choices": tuple(choices)},
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

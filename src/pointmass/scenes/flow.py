@@ -64,6 +64,8 @@ class FlowScene(ShippedScene):
         inside = ((end[:, :2] > 0) & (end[:, :2] < (2.0, 1.0))).all()
         expect(bool(inside), "a particle left the box along whose walls it flows")
         if self.sway == 0:
-            stream = [np.sin(np.pi * f.positions[:, 0]) * np.sin(np.pi * f.positions[:, 1]) for f in (frames[0], frames[-1])]
+            stream = [
+                np.sin(np.pi * f.positions[:, 0]) * np.sin(np.pi * f.positions[:, 1]) for f in (frames[0], frames[-1])
+            ]
             drift = float(np.abs(stream[1] - stream[0]).max())
             expect(drift < 1e-4, f"a particle drifted by {drift:.2g} off its integral curve")

@@ -54,7 +54,9 @@ class Orbit(ShippedScene):
         if eight:
             x1, v3 = np.array(EIGHT_X), np.array(EIGHT_V)
             stars = points([x1, -x1, (0, 0)], [-v3 / 2, -v3 / 2, v3])
-            return Scene(**common, bodies=[stars], forces=[Gravitation()], camera=Camera(azimuth=0, elevation=0), look=look)
+            return Scene(
+                **common, bodies=[stars], forces=[Gravitation()], camera=Camera(azimuth=0, elevation=0), look=look
+            )
         e = np.linspace(0, 0.8, self.planets) if self.planets > 1 else np.array([0.5])
         a = np.linspace(0.5, 1.4, self.planets)
         turn = 2.399963 * np.arange(self.planets)

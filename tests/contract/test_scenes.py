@@ -1,0 +1,115 @@
+"""Every scene that ships runs headless, twice to the same bits, passes its own check, and survives as text."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pointmass.errors import InvalidInput
+from pointmass.frame import Frame
+from pointmass.scene import Scene
+from pointmass.scenes import SCENES, CheckFailed
+from pointmass.scenes.base import ShippedScene
+
+SMALL = {  # fewer particles where the default takes long; the physics is the same
+    "flow": {"particles": 200, "arrows": 6, "streamlines": 6},
+    "springs": {"side": 4},
+    "fountain": {"rate": 200},
+    "bounce": {"balls": 20},
+}
+VARIANTS = [(name, SMALL.get(name, {})) for name in SCENES] + [
+    ("orbit", {"kind": "kepler"}),
+    ("flow", {"particles": 200, "sway": 0.0, "arrows": 0, "streamlines": 0}),
+]
+
+
+def frames_of(scene: Scene, count: int) -> list[Frame]:
+    return list(scene.simulation().frames(count, scene.fps))
+
+
+def bits(frames: list[Frame]) -> list[bytes]:
+    return [f.positions.tobytes() + f.velocities.tobytes() + f.ids.tobytes() for f in frames]
+
+
+def made(name: str, settings: dict[str, object]) -> ShippedScene:
+    return SCENES[name].with_settings(settings)
+
+
+@pytest.mark.parametrize(("name", "settings"), VARIANTS)
+def test_scene_passes_its_check_and_repeats_its_bits(name: str, settings: dict[str, object]) -> None:
+    shipped = made(name, settings)
+    scene = shipped.build()
+    count = min(scene.frames, 150)
+    first = frames_of(scene, count)
+    shipped.check(first)
+    assert all(np.isfinite(f.positions).all() and np.isfinite(f.velocities).all() for f in first)
+    again = frames_of(Scene.from_toml(scene.to_toml()), 30)
+    assert bits(again) == bits(first[:30])
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", SCENES)
+def test_scene_passes_its_check_at_full_length(name: str) -> None:
+    shipped = SCENES[name]()
+    scene = shipped.build()
+    shipped.check(frames_of(scene, scene.frames))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_frames_of_a_scene_show_something(name: str) -> None:
+    scene = made(name, SMALL.get(name, {})).build()
+    last = frames_of(scene, 30)[-1]
+    assert {d.kind for d in last.drawables} & {"points", "segments", "curves"}
+    for drawable in last.drawables:
+        assert drawable.version >= 0
+        for attribute in vars(drawable).values():
+            if isinstance(attribute, np.ndarray) and attribute.dtype.kind == "f":
+                assert np.isfinite(attribute).all()
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_scene_declares_its_parameters(name: str) -> None:
+    shipped = SCENES[name]
+    assert shipped.name == name
+    assert shipped.summary().endswith(".")
+    assert 4 <= len(shipped.parameters()) <= 12
+    for parameter in shipped.parameters():
+        assert parameter["summary"]
+        low, high = parameter["minimum"], parameter["maximum"]
+        if low is not None:
+            assert low <= parameter["default"] <= high
+            with pytest.raises(InvalidInput, match=parameter["name"]):
+                shipped.with_settings({parameter["name"]: high * 2 + 1})
+        with pytest.raises(InvalidInput, match=parameter["name"]):
+            shipped.with_settings(
+                {parameter["name"]: float("nan")} if low is not None else {parameter["name"] + "x": 1}
+            )
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_check_can_fail(name: str) -> None:
+    """A run that was tampered with does not pass."""
+    shipped = made(name, SMALL.get(name, {}))
+    frames = frames_of(shipped.build(), 40)
+    last = frames[-1]
+    wrong = Frame(
+        number=last.number,
+        time=last.time,
+        ids=last.ids,
+        positions=last.positions - (0.0, 100.0, 100.0),
+        velocities=last.velocities,
+        quantities={k: 2 * v + 1e6 for k, v in last.quantities.items()},
+    )
+    with pytest.raises(CheckFailed, match=r".{20,}"):
+        shipped.check([*frames[:-1], wrong])
+
+
+def test_scene_parameters_are_checked_in_one_sentence() -> None:
+    with pytest.raises(InvalidInput, match=r"links = 0 is not allowed"):
+        SCENES["pendulum"].with_settings({"links": 0})
+    with pytest.raises(InvalidInput, match=r"links = 2.5 is not allowed: it must be a whole number"):
+        SCENES["pendulum"].with_settings({"links": "2.5"})
+    with pytest.raises(InvalidInput, match=r"did you mean 'length'"):
+        SCENES["pendulum"].with_settings({"lenght": 1})
+    with pytest.raises(InvalidInput, match=r"known are figure_eight, kepler"):
+        SCENES["orbit"].with_settings({"kind": "square"})
