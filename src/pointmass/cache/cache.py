@@ -1,0 +1,289 @@
+"""A run on disk: a folder in Zarr format 3 that is valid after a kill at any moment."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+
+from pointmass.cache.drawables import read_drawable, write_drawable
+from pointmass.cache.groups import Damaged, packed, read_attributes, read_group, unpacked, write_group
+from pointmass.errors import InvalidInput, number
+from pointmass.frame import Camera, Drawable, Frame
+
+if TYPE_CHECKING:
+    from pointmass.scene import Scene
+
+FORMAT = "pointmass cache"
+VERSION = 1
+LIBRARIES = ("numpy", "scipy", "numba", "zarr")
+
+
+class Cache(Sequence[Frame]):
+    """The frames of a run, in a folder that other programs can read with zarr alone.
+
+    The root's attributes say what the run was: scene (TOML), scene_hash, seed, dt [s], fps [1/s], solver, dtype,
+    camera, versions. `frames/000000` holds `ids`, `positions` [m], `velocities` [m/s] and the attributes number,
+    time [s], quantities and drawables, as pairs of name and version; `drawables/<name>/<version>` holds what there is
+    to see, once. Each group is written beside and renamed into place, and a frame after all that it refers to: at any
+    moment the folder is a valid cache of the frames that are complete.
+
+    Attributes
+    ----------
+    path : of the folder.
+    attributes : what the run was.
+
+    Examples
+    --------
+    >>> cache = pm.record(sim, "swing.zarr", frames=240, fps=60)
+    >>> pm.Cache.open("swing.zarr")[100].positions
+    """
+
+    def __init__(self, path: Path, attributes: dict[str, Any], count: int) -> None:
+        self.path = path
+        self.attributes = attributes
+        self._count = count
+        self._seen: dict[str, Drawable] = {}
+
+    @classmethod
+    def create(
+        cls,
+        path: str | Path,
+        scene: Scene | None = None,
+        *,
+        fps: float = 60.0,
+        camera: Camera | None = None,
+        overwrite: bool = False,
+        **about: Any,
+    ) -> Cache:
+        """A new cache without frames.
+
+        Parameters
+        ----------
+        path : of the folder; the one that holds it must exist.
+        scene : that is run; it is stored as text, unless it holds laws written in Python.
+        fps : frames per second of simulated time.
+        camera : for pictures of these frames; the scene's by default.
+        overwrite : whether a cache that is there already goes.
+        about : what else is worth knowing, as it can stand in JSON: seed, dt, solver.
+
+        Raises
+        ------
+        InvalidInput
+            The place cannot be written, or something is there that must not go.
+        """
+        path = Path(path)
+        check_target(path, overwrite)
+        text = _text(scene)
+        camera = camera or (scene.camera if scene is not None else Camera())
+        attributes = {
+            "format": FORMAT,
+            "version": VERSION,
+            "scene": text,
+            "scene_hash": None if text is None else hashlib.sha256(text.encode()).hexdigest(),
+            "name": path.stem if scene is None else scene.name,
+            "fps": number("fps", fps, above=0, unit="1/s"),
+            **about,
+            "camera": {name: packed(value) for name, value in asdict(camera).items()},
+            "versions": {"pointmass": _own_version(), **{library: version(library) for library in LIBRARIES}},
+        }
+        try:
+            _make(path, attributes)
+        except OSError as error:
+            raise InvalidInput(f"cannot write the cache {str(path)!r}: {error.strerror}") from None
+        return cls(path, attributes, 0)
+
+    @classmethod
+    def open(cls, path: str | Path) -> Cache:
+        """The cache in a folder.
+
+        Raises
+        ------
+        InvalidInput
+            There is none, or frames are missing from it.
+        """
+        path = Path(path)
+        if not path.is_dir():
+            raise InvalidInput(f"cannot read the cache {str(path)!r}: there is no such folder")
+        try:
+            attributes = read_attributes(path)
+            numbers = sorted(int(f.name) for f in (path / "frames").iterdir() if f.name.isdecimal())
+            camera_of(attributes)
+        except (Damaged, OSError, KeyError, TypeError, ValueError):
+            attributes, numbers = {}, []
+        if attributes.get("format") != FORMAT:
+            raise InvalidInput(f"{str(path)!r} is not a pointmass cache: make one with pointmass run")
+        if attributes.get("version") != VERSION:
+            raise InvalidInput(
+                f"the cache {str(path)!r} has version {attributes.get('version')}:"
+                f" this pointmass reads version {VERSION}"
+            )
+        for k, found in enumerate(numbers):
+            if k != found:
+                raise InvalidInput(f"the cache {str(path)!r} is damaged: frame {k} is missing; run the scene again")
+        return cls(path, attributes, len(numbers))
+
+    def append(self, frame: Frame) -> None:
+        """Add a frame at the end.
+
+        Raises
+        ------
+        InvalidInput
+            It cannot be written, such as on a full disk. The frames before it stay.
+        """
+        attributes = {
+            "number": frame.number,
+            "time": packed(frame.time),
+            "quantities": {name: packed(value) for name, value in frame.quantities.items()},
+            "drawables": [[d.name, d.version] for d in frame.drawables],
+        }
+        arrays = {
+            "ids": np.asarray(frame.ids),
+            "positions": np.asarray(frame.positions),
+            "velocities": np.asarray(frame.velocities),
+        }
+        try:
+            for drawable in frame.drawables:
+                write_drawable(self.path, drawable)
+            write_group(self._folder(self._count), attributes, arrays)
+        except OSError as error:
+            raise InvalidInput(
+                f"cannot write frame {self._count} of the cache {str(self.path)!r}: {error.strerror}"
+            ) from None
+        self._count += 1
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __iter__(self) -> Iterator[Frame]:
+        return (self.frame(k) for k in range(len(self)))
+
+    @overload
+    def __getitem__(self, k: int) -> Frame: ...
+    @overload
+    def __getitem__(self, k: slice) -> list[Frame]: ...
+    def __getitem__(self, k: int | slice) -> Frame | list[Frame]:
+        if isinstance(k, slice):
+            return [self.frame(j) for j in range(*k.indices(len(self)))]
+        if not -len(self) <= k < len(self):
+            raise IndexError(f"frame {k} of {len(self)}")
+        return self.frame(k % len(self))
+
+    def frame(self, k: int) -> Frame:
+        """Frame k, counted from 0, with the bits that it had; a drawable that did not change is the same object.
+
+        Raises
+        ------
+        InvalidInput
+            There is no such frame, or it is damaged.
+        """
+        if not 0 <= k < len(self):
+            raise InvalidInput(
+                f"frame = {k} is not allowed: the cache {str(self.path)!r} has {len(self)} frames, counted from 0"
+            )
+        try:
+            attributes, arrays = read_group(self._folder(k))
+            drawables = tuple(self._drawable(name, version) for name, version in attributes["drawables"])
+            self._seen = {d.name: d for d in drawables}
+            return Frame(
+                number=attributes["number"],
+                time=unpacked(attributes["time"]),
+                ids=arrays["ids"],
+                positions=arrays["positions"],
+                velocities=arrays["velocities"],
+                drawables=drawables,
+                quantities={name: unpacked(value) for name, value in attributes["quantities"].items()},
+            )
+        except (Damaged, KeyError, TypeError, ValueError) as error:
+            raise InvalidInput(
+                f"frame {k} of the cache {str(self.path)!r} cannot be read: {error}; run the scene again"
+            ) from None
+
+    @property
+    def scene(self) -> Scene | None:
+        """The scene that was run, or None if it was not stored."""
+        from pointmass.scene import Scene
+
+        text = self.attributes.get("scene")
+        return None if text is None else Scene.from_toml(text)
+
+    @property
+    def camera(self) -> Camera:
+        """The camera for pictures; what it leaves open is found from the frames."""
+        return camera_of(self.attributes)
+
+    @property
+    def fps(self) -> float:
+        """Frames per second of simulated time."""
+        return float(self.attributes["fps"])
+
+    def _folder(self, k: int) -> Path:
+        return self.path / "frames" / f"{k:06d}"
+
+    def _drawable(self, name: str, version: int) -> Drawable:
+        seen = self._seen.get(name)
+        return seen if seen is not None and seen.version == version else read_drawable(self.path, name, version)
+
+
+def camera_of(attributes: dict[str, Any]) -> Camera:
+    """The camera in a cache's attributes."""
+    return Camera(**{name: unpacked(value) for name, value in attributes["camera"].items()})
+
+
+def check_target(path: Path, overwrite: bool) -> None:
+    """Refuse a place for a cache before anything is computed or written.
+
+    Raises
+    ------
+    InvalidInput
+        One sentence: no such folder, it cannot be written, or something is there that is no cache.
+    """
+    if not path.parent.is_dir():
+        raise InvalidInput(f"cannot write the cache {str(path)!r}: there is no folder {str(path.parent)!r}")
+    if path.exists() or path.is_symlink():
+        try:
+            is_cache = read_attributes(path).get("format") == FORMAT
+        except Damaged:
+            is_cache = False
+        if not is_cache:
+            raise InvalidInput(f"cannot write the cache {str(path)!r}: something else is there; give another name")
+        if not overwrite:
+            raise InvalidInput(f"the cache {str(path)!r} is there already: give another name, or overwrite=True")
+    try:
+        Path(tempfile.mkdtemp(prefix=f".{path.name[:32]}-", dir=path.parent)).rmdir()
+    except OSError as error:
+        raise InvalidInput(f"cannot write into folder {str(path.parent)!r}: {error.strerror}") from None
+
+
+def _make(path: Path, attributes: dict[str, Any]) -> None:
+    """An empty cache, in place of the one that was there."""
+    beside = Path(tempfile.mkdtemp(prefix=f".{path.name[:32]}-", dir=path.parent))
+    try:
+        new = beside / "new"
+        for folder, what in ((new, attributes), (new / "frames", {}), (new / "drawables", {})):
+            write_group(folder, what, {})
+        if path.exists():
+            path.rename(beside / "old")
+        new.rename(path)
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+
+
+def _text(scene: Scene | None) -> str | None:
+    try:
+        return None if scene is None else scene.to_toml()
+    except InvalidInput:
+        return None  # a law written in Python has no text; the frames do not need it
+
+
+def _own_version() -> str:
+    from pointmass import __version__
+
+    return __version__
