@@ -196,7 +196,7 @@ def interpolated(values, origin, spacing, times, outside, x, t):
             if outside == "zero":
                 return [0.0, 0.0, 0.0]
             place = min(max(place, 0.0), count - 1.0)
-        low = int(math.floor(place))
+        low = math.floor(place)
         cells.append([(low % count, 1 - (place - low)), ((low + 1) % count, place - low)])
     moments = [(0, 1.0)]
     if t >= times[-1]:

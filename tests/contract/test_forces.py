@@ -22,7 +22,7 @@ from pointmass.particles import Particles
 from pointmass.system import ParticleSystem
 
 sys.path.append(str(Path(__file__).parents[1]))
-import naive  # noqa: E402
+import naive
 
 N = 6
 TIME = 0.7
@@ -156,9 +156,7 @@ EXAMPLES: dict[str, list[Example]] = {
         ),
     ],
     "point_vortices": [
-        Example(
-            {"eps": 0.1}, lambda i: {"circulation": CIRCULATION[i], "eps": 0.1}, naive.point_vortices, pairs=True
-        ),
+        Example({"eps": 0.1}, lambda i: {"circulation": CIRCULATION[i], "eps": 0.1}, naive.point_vortices, pairs=True),
         Example(
             {"circulation": "circulation * t"},
             lambda i: {"circulation": CIRCULATION[i] * TIME, "eps": 0.0},

@@ -38,17 +38,22 @@ def _quadrant(a: Number) -> tuple[Number, Number, Number]:
     return r + r * (z * polynomial(SIN[1:], z)), polynomial(COS, z), k - 4.0 * floor(k * 0.25)
 
 
+def _within_one(value: Number) -> Number:
+    """An angle too large to be reduced gives any number, but not one beyond 1."""
+    return minimum(maximum(value, -1.0), 1.0)
+
+
 def sin(a: Number) -> Number:
     """Sine."""
     s, c, q = _quadrant(a)
-    value = where((q == 1.0) | (q == 3.0), c, s)
+    value = _within_one(where((q == 1.0) | (q == 3.0), c, s))
     return where(q >= 2.0, -value, value)
 
 
 def cos(a: Number) -> Number:
     """Cosine."""
     s, c, q = _quadrant(a)
-    value = where((q == 1.0) | (q == 3.0), s, c)
+    value = _within_one(where((q == 1.0) | (q == 3.0), s, c))
     return where((q == 1.0) | (q == 2.0), -value, value)
 
 

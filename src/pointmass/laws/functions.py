@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from pointmass.errors import InvalidInput
 from pointmass.laws.program import Symbol, Vector, power, whole_power
 
 Number = Any  # a float, an array or a Symbol
@@ -40,6 +41,8 @@ def operation(name: str, *arguments: Number) -> Number:
         if isinstance(argument, Symbol):
             nodes = (argument.lift(a) for a in arguments)
             return Symbol(argument.program, argument.program.operation(name, *nodes))
+        if isinstance(argument, (tuple, list)) and any(isinstance(a, Symbol) for a in argument):
+            raise InvalidInput("a vector was used as a number: use pm.length(v), pm.dot(a, b) or v[0]")
     if name in NUMPY:
         with np.errstate(all="ignore"):
             return np.asarray(NUMPY[name](*arguments))[()]
@@ -54,12 +57,12 @@ def sqrt(a: Number) -> Number:
 
 
 def sin(a: Number) -> Number:
-    """Sine of an angle [rad]; full accuracy up to |a| of some 1e6."""
+    """Sine of an angle [rad]; full accuracy up to |a| of some 1e7 (float32: 1e4)."""
     return operation("sin", a)
 
 
 def cos(a: Number) -> Number:
-    """Cosine of an angle [rad]; full accuracy up to |a| of some 1e6."""
+    """Cosine of an angle [rad]; full accuracy up to |a| of some 1e7 (float32: 1e4)."""
     return operation("cos", a)
 
 
