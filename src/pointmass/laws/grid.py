@@ -124,7 +124,8 @@ class GridLookup(Primitive):
         dtype = np.result_type(*arguments, np.float32)
         x, y, z, t = (np.asarray(a, dtype) for a in np.broadcast_arrays(*arguments))
         table = self.grid.table(dtype)[..., self.component]
-        axes = [self._in_time(t), *(self._along(axis, a) for axis, a in enumerate((x, y, z)))]
+        with np.errstate(all="ignore"):  # places that are NaN or infinite show in the result
+            axes = [self._in_time(t), *(self._along(axis, a) for axis, a in enumerate((x, y, z)))]
         total = np.zeros(x.shape, dtype)
         for corner in product(*axes):
             points, weights = zip(*corner, strict=True)
