@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, Contact, rows_dot
+from pointmass.collisions.collider import Array, Collider, Contact, directions, lengths
 from pointmass.collisions.plane import Plane
 from pointmass.errors import InvalidInput, finite_array
 from pointmass.laws.parameter import Vector
@@ -50,20 +50,17 @@ class Box(Collider):
 
     def local_distance(self, x: Array) -> Array:
         if self.walls:
-            return np.min([wall.local_distance(x) for wall in self.walls], axis=0)
-        q = np.abs(x) - self.half.astype(x.dtype)
-        out = np.maximum(q, 0)
-        return np.sqrt(rows_dot(out, out)) + np.minimum(q.max(axis=1), 0)
+            return np.min(self.half - np.abs(x), axis=1)
+        q = np.abs(x) - self.half
+        return lengths(np.maximum(q, 0)) + np.minimum(q.max(axis=1), 0)
 
     def local_normal(self, x: Array) -> Array:
+        q = np.abs(x) - self.half
+        face = np.eye(3)[np.argmax(q, axis=1)]
         if self.walls:
-            nearest = np.argmin([wall.local_distance(x) for wall in self.walls], axis=0)
-            return np.array([wall.direction for wall in self.walls], x.dtype)[nearest]
-        q = np.abs(x) - self.half.astype(x.dtype)
+            return np.where(x < 0, face, -face)
         out = np.maximum(q, 0)
-        size = np.sqrt(rows_dot(out, out))[:, None]
-        face = np.eye(3, dtype=x.dtype)[np.argmax(q, axis=1)]
-        n = np.where(size > 0, out / np.where(size > 0, size, 1), face)
+        n = directions(out, lengths(out), face)
         return np.where(x < 0, -n, n)
 
     def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:
@@ -78,7 +75,5 @@ class Box(Collider):
             eps=self.eps,
             contact=self.contact,
         )
-        wall.place, wall.velocity_parameter = self.place, self.velocity_parameter
-        wall.acceleration_parameter = self.acceleration_parameter
-        wall.offset = -float(self.half[axis])
+        wall.motion, wall.offset = self.motion, -float(self.half[axis])
         return wall

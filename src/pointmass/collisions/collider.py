@@ -9,9 +9,10 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pointmass.collisions.motion import Motion
 from pointmass.description import Described
 from pointmass.errors import InvalidInput, finite_array, number
-from pointmass.laws.parameter import Parameter, Vector
+from pointmass.laws.parameter import Vector
 
 Array = NDArray[np.floating[Any]]
 Contact = Literal["swept", "discrete"]
@@ -20,7 +21,7 @@ Contact = Literal["swept", "discrete"]
 class Collider(Described, ABC):
     """A surface that particles bounce off: V' = V_T - k_r V_N (lecture, "Collision Response").
 
-    Coulomb friction acts on V_T. The free side is where the signed distance is positive.
+    Coulomb friction acts on V_T. The free side is where the signed distance is positive. Distances are computed in float64.
 
     Attributes
     ----------
@@ -28,7 +29,7 @@ class Collider(Described, ABC):
     friction : Coulomb's mu, at least 0.
     eps : how near is in contact [m].
     contact : "swept": nothing tunnels, the time of impact is found; "discrete": the lecture's test at the end of each step.
-    place : the reference point [m]; it may move as a function of t.
+    motion : of the reference point, in time.
     bulges : True where the solid is convex (ball, block): a line between two free points may pass through it. False
         where the free space is convex (plane, inside of a sphere).
     """
@@ -36,11 +37,7 @@ class Collider(Described, ABC):
     bulges: ClassVar[bool] = True
 
     def __init__(self, place: Vector, restitution: float, friction: float, eps: float, contact: Contact) -> None:
-        self.place = Parameter("center", place, vector=True, unit="m")
-        if not self.place.common:
-            raise InvalidInput("the place of a collider may depend on t and nothing else")
-        self.velocity_parameter = self.place.rate()
-        self.acceleration_parameter = self.velocity_parameter.rate()
+        self.motion = Motion(place)
         self.restitution = number("restitution", restitution, at_least=0, at_most=1)
         self.friction = number("friction", friction, at_least=0)
         self.eps = number("eps", eps, above=0, unit="m")
@@ -56,7 +53,7 @@ class Collider(Described, ABC):
     @property
     def moves(self) -> bool:
         """Whether the place depends on t."""
-        return not self.place.constant
+        return self.motion.fixed is None
 
     @abstractmethod
     def local_distance(self, x: Array) -> Array:
@@ -67,11 +64,11 @@ class Collider(Described, ABC):
         """Gradient of the distance, unit vectors, shape (k, 3)."""
 
     def bending(self, x: Array, v: Array) -> Array:
-        """v . H v with H the Hessian of the distance [m/s^2], shape (k,): how fast a surface curves away under a velocity.
+        """How fast the surface curves away under a velocity [m/s^2], shape (k,): v . H v, H the Hessian of the distance.
 
         `x` is relative to the place. 0 for flat surfaces.
         """
-        return np.zeros(len(x), x.dtype)
+        return np.zeros(len(x))
 
     @property
     def surfaces(self) -> Sequence[Collider]:
@@ -84,32 +81,33 @@ class Collider(Described, ABC):
 
     def distance(self, x: Array, t: Any) -> Array:
         """Signed distance [m] of points, shape (k, 3), at time t (a number or shape (k,))."""
-        return self.local_distance(x - self.at(t))
+        return self.local_distance(x - self.motion.place(t))
 
     def normal(self, x: Array, t: Any) -> Array:
         """Outward unit normals at the points, shape (k, 3)."""
-        return self.local_normal(x - self.at(t))
+        return self.local_normal(x - self.motion.place(t))
 
     def at(self, t: Any) -> Array:
         """The place [m], shape (3,) or (k, 3)."""
-        return _columns(self.place.at(t))
+        return self.motion.place(t)
 
     def velocity(self, t: Any) -> Array:
         """Velocity of the surface [m/s], shape (3,) or (k, 3)."""
-        return _columns(self.velocity_parameter.at(t))
+        return self.motion.velocity(t)
 
     def acceleration(self, t: Any) -> Array:
         """Acceleration of the surface [m/s^2], shape (3,) or (k, 3)."""
-        return _columns(self.acceleration_parameter.at(t))
+        return self.motion.acceleration(t)
 
 
 def unit(name: str, value: Any) -> NDArray[np.float64]:
     """A direction as a unit vector."""
     array = finite_array(name, value, (3,))
-    size = float(np.linalg.norm(array))
-    if size == 0:
+    largest = float(np.abs(array).max())
+    if largest == 0:
         raise InvalidInput(f"{name} = {value} is not allowed: it must not be zero")
-    return array / size
+    array = array / largest  # squares of tiny and huge numbers would leave the range of floats
+    return array / np.linalg.norm(array)
 
 
 def rows_dot(a: Array, b: Array) -> Array:
@@ -117,5 +115,12 @@ def rows_dot(a: Array, b: Array) -> Array:
     return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
 
 
-def _columns(parts: Sequence[Any]) -> Array:
-    return np.stack(np.broadcast_arrays(*parts), axis=-1)
+def lengths(a: Array) -> Array:
+    """Length of each row."""
+    return np.sqrt(rows_dot(a, a))
+
+
+def directions(a: Array, size: Array, otherwise: Array) -> Array:
+    """Rows divided by their lengths `size`; `otherwise` where that is 0."""
+    long = (size > 0)[:, None]
+    return np.where(long, a / np.where(long, size[:, None], 1), otherwise)

@@ -7,41 +7,62 @@ into the surface is taken away, and Coulomb friction of at most mu times that lo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, rows_dot
+from pointmass.collisions.collider import Array, Collider, directions, lengths, rows_dot
 
 Rows = NDArray[np.intp]
-PASSES = 32  # over the contacts of a particle that stands in a corner
+Mask = NDArray[np.bool_]
+PASSES = 64  # over the contacts of particles that stand on more than one surface
+SETTLED = 1e-13  # relative change of the contact forces at which the passes end
+STILL = 64.0  # roundings of a velocity: a slower one along a surface is none
+NONE = np.zeros(3)
 
 
 @dataclass(eq=False)
 class Standing:
-    """The particles that stand on one surface.
+    """The particles that stand on one surface, during one piece of a step.
 
     Attributes
     ----------
     rows : of the particles.
+    start : where they are on the surface at first [m], shape (k, 3).
+    level : depth at which each stands [m], 0 unless it began the piece inside, shape (k,).
     slide : direction in which each slides along the surface, 0 for those that stick, shape (k, 3).
-    load : force with which each is pressed on at the start [N], shape (k,).
-    pressed, normal : whether the last filtered force pressed each on the surface, and the normals there.
+    speed : of the slide at first [m/s], shape (k,).
+    load : force with which each is pressed on at first [N], shape (k,).
+    given : force of the contact at the last evaluation, shape (k, 3).
+    normal : normals there, shape (k, 3).
+    pressed, held : whether it was pressed on there, and friction held it in its place.
     """
 
     surface: Collider
     rows: Rows
+    start: Array
+    level: Array
     slide: Array
+    speed: Array
     load: Array
-    pressed: NDArray[np.bool_] = field(init=False)
+    given: Array = field(init=False)
     normal: Array = field(init=False)
+    pressed: Mask = field(init=False)
+    held: Mask = field(init=False)
 
     def __post_init__(self) -> None:
-        self.pressed = np.zeros(len(self.rows), bool)
-        self.normal = np.zeros((len(self.rows), 3))
+        k = len(self.rows)
+        self.given, self.normal = np.zeros((k, 3)), np.zeros((k, 3))
+        self.pressed, self.held = np.zeros(k, bool), np.zeros(k, bool)
+        self.sticks = (self.slide == 0).all(axis=1)
+
+    def motion(self, t: Array) -> tuple[Array, Array]:
+        """Place and velocity of the surface at the clocks of all particles, for each row."""
+        now = t[self.rows]
+        return self.surface.at(now), self.surface.velocity(now)
 
 
 class Contacts:
@@ -58,16 +79,19 @@ class Contacts:
         self.standing: list[Standing] = []
         self._passes = 1
 
+    def on(self, surface: Collider) -> Rows:
+        """Rows of the particles that stand on a surface."""
+        return next((s.rows for s in self.standing if s.surface is surface), np.zeros(0, np.intp))
+
     def find(
-        self, x: Array, v: Array, m: Array, acceleration: Any, t: Any, radius: Array, free: NDArray[np.bool_]
+        self, x: Array, v: Array, m: Array, acceleration: Callable[[], Array], t: Array, radius: Array, free: Mask
     ) -> None:
         """Find out who stands where, and stop their motion into and out of the surface.
 
         Parameters
         ----------
         x, v : state at the start of the piece, shape (n, 3); `v` is changed in place.
-        acceleration : function without arguments that gives the unfiltered accelerations, shape (n, 3); it is called only where
-            something is near a surface.
+        acceleration : gives the unfiltered accelerations, shape (n, 3); called only where something is near a surface.
         t : clock of each particle, shape (n,).
         free : which particles to look at.
         """
@@ -75,106 +99,191 @@ class Contacts:
         a: Array | None = None
         for surface in self.surfaces:
             gap = surface.distance(x, t) - radius
-            rows = np.flatnonzero(free & (np.abs(gap) <= surface.eps))
-            if not len(rows):
-                continue
-            a = acceleration() if a is None else a
-            stand = self._stand(surface, rows, x, v, m, a, t)
-            if len(stand.rows):
-                self.standing.append(stand)
-        everyone = np.concatenate([s.rows for s in self.standing]) if len(self.standing) > 1 else np.zeros(0)
-        self._passes = 1 if len(np.unique(everyone)) == len(everyone) else PASSES
+            rows = np.flatnonzero(free & (gap <= surface.eps))
+            if len(rows):
+                a = acceleration() if a is None else a
+                self._stand(surface, rows, gap[rows], x, v, m, a, t)
+        shared = sum(len(s.rows) for s in self.standing) > len({r for s in self.standing for r in s.rows.tolist()})
+        self._passes = PASSES if shared else 1
+        for _ in range(self._passes if self.order == 2 else 0):
+            if not any([self._stop(stand, v, t) for stand in self.standing]):
+                break
+        for stand in self.standing:
+            self._choose_slide(stand, v, m, a, t)
 
     def forces(self, t: Any, x: Array, v: Array, m: Array, f: Array) -> None:
-        """Take away what presses into the surfaces, and add friction."""
-        for stand in self.standing:
-            stand.pressed[:] = False
+        """Take away what presses into the surfaces, and add friction (projected Gauss-Seidel over the contacts)."""
+        looks = [self._look(stand, t, x, v, m) for stand in self.standing]
         for _ in range(self._passes):
-            before = f.copy() if self._passes > 1 else f
-            for stand in self.standing:
-                self._bear(stand, t, x, v, m, f)
-            if self._passes > 1 and np.array_equal(before, f):
+            if not any([self._bear(stand, *look, f) for stand, look in zip(self.standing, looks, strict=True)]):
                 break
 
     def projection(self, n: int) -> Any:
-        """Directions in which contacts leave particles free, shape (3n, 3n): none where it sticks, along the surface where it slides."""
-        from scipy.sparse import block_diag, csr_array
+        """Directions in which contacts leave particles free, shape (3n, 3n): what the lagged filter does to df.
+
+        None where it sticks, along the surface where it slides.
+        """
+        from scipy.sparse import bsr_array
 
         blocks = np.tile(np.eye(3), (n, 1, 1))
         for stand in self.standing:
-            rows = stand.rows[stand.pressed]
-            normal = stand.normal[stand.pressed]
-            across = np.eye(3) - normal[:, :, None] * normal[:, None, :]
-            sticks = (stand.slide[stand.pressed] == 0).all(axis=1) & (stand.surface.friction > 0)
-            blocks[rows] = np.where(sticks[:, None, None], 0, blocks[rows] @ across)
-        return csr_array(block_diag(list(blocks)))
+            across = np.eye(3) - stand.normal[:, :, None] * stand.normal[:, None, :]
+            hold = stand.sticks & (stand.surface.friction > 0)
+            blocks[stand.rows] = np.where(hold[:, None, None], 0, across @ blocks[stand.rows])
+        if self._passes > 1:
+            blocks = np.linalg.matrix_power(blocks, self._passes)
+        return bsr_array((blocks, np.arange(n), np.arange(n + 1)), shape=(3 * n, 3 * n)).tocsr()
 
-    def settle(self, x: Array, v: Array, t: Any, radius: Array) -> None:
-        """Keep those that stand out of the surface at the end of a piece, and stop those whom friction stopped. In place."""
+    def settle(self, x: Array, v: Array, t: Array, h: Array, radius: Array) -> None:
+        """Bring those that stood back to their surface at the end of a piece; in place.
+
+        Who is held by friction goes where its place on the surface goes, whom friction stopped is where it came to rest, who is pressed on is
+        put back on the surface, and nobody is left inside.
+
+        Parameters
+        ----------
+        t, h : clock at the end of the piece, and its length, of each particle, shape (n,).
+        """
         for stand in self.standing:
-            rows, surface = stand.rows, stand.surface
-            now = t[rows]
-            local = x[rows] - surface.at(now)
-            normal = surface.local_normal(local)
-            sunk = np.minimum(surface.local_distance(local) - radius[rows], 0)
-            x[rows] -= sunk[:, None] * normal
-            back = rows_dot(v[rows] - surface.velocity(now), stand.slide)
-            stops = (back < 0) & (stand.slide != 0).any(axis=1)
-            v[rows] -= np.where(stops, back, 0)[:, None] * stand.slide
-            into = np.minimum(rows_dot(v[rows] - surface.velocity(now), normal), 0)
-            v[rows] -= np.where(sunk < 0, into, 0)[:, None] * normal
+            self._hold(stand, x, v, t, h)
+        for _ in range(self._passes):
+            if not any([self._put_back(stand, x, v, t, h, radius) for stand in self.standing]):
+                break
 
-    def _stand(self, surface: Collider, rows: Rows, x: Array, v: Array, m: Array, a: Array, t: Any) -> Standing:
-        now, local = t[rows], x[rows] - surface.at(t[rows])
-        normal, relative = surface.local_normal(local), v[rows] - surface.velocity(now)
+    # ------------------------------------------------------------------------------------------------ at the start
+
+    def _stand(self, surface: Collider, rows: Rows, gap: Array, x: Array, v: Array, m: Array, a: Array, t: Array) -> None:
+        """Add those of `rows` that stand."""
+        now = t[rows]
+        local = x[rows] - surface.at(now)
+        normal, motion = surface.local_normal(local), surface.velocity(now)
         if self.order == 1:
-            stands = rows_dot(a[rows] - surface.velocity(now), normal) < 0
-            count = int(stands.sum())
-            return Standing(surface, rows[stands], np.zeros((count, 3), x.dtype), np.zeros(count, x.dtype))
-        speed = rows_dot(relative, normal)
-        push = a[rows] - surface.acceleration(now)
-        lift = rows_dot(push, normal) + surface.bending(local, relative)
-        stands = (lift < 0) & (np.abs(speed) <= np.sqrt(2 * surface.eps * np.abs(lift)))
-        rows, normal, speed, relative = rows[stands], normal[stands], speed[stands], relative[stands]
-        push, lift = push[stands], lift[stands]
-        v[rows] -= speed[:, None] * normal
-        slide = _direction(relative - speed[:, None] * normal, 1e-12 * (1 + np.abs(v[rows]).max(axis=1)))
-        if self.lagged:
-            along = push - rows_dot(push, normal)[:, None] * normal
-            slips = np.sqrt(rows_dot(along, along)) > surface.friction * -lift
-            sticks = (slide == 0).all(axis=1)
-            slide = np.where((sticks & slips)[:, None], _direction(along, np.zeros(len(rows))), slide)
-        return Standing(surface, rows, slide, -lift * m[rows])
+            lift = rows_dot(a[rows] - motion, normal)
+            stands = lift < 0
+        else:
+            relative = v[rows] - motion
+            lift = rows_dot(a[rows] - surface.acceleration(now), normal) + surface.bending(local, relative)
+            slow = np.abs(rows_dot(relative, normal)) <= np.sqrt(2 * surface.eps * np.abs(lift))
+            stands = (lift < 0) & slow
+        rows = rows[stands]
+        if len(rows):
+            level = np.where(gap < -surface.eps, gap, 0)[stands]
+            nothing = np.zeros((len(rows), 3))
+            load = -lift[stands] * m[rows]
+            self.standing.append(Standing(surface, rows, local[stands], level, nothing, nothing[:, 0], load))
+            self.standing[-1].normal = normal[stands]
 
-    def _bear(self, stand: Standing, t: Any, x: Array, v: Array, m: Array, f: Array) -> None:
+    def _stop(self, stand: Standing, v: Array, t: Array) -> bool:
+        """Take the velocity into and out of the surface; whether there was any."""
+        _, motion = stand.motion(t)
+        speed = rows_dot(v[stand.rows] - motion, stand.normal)
+        v[stand.rows] -= speed[:, None] * stand.normal
+        return bool((np.abs(speed) > _roundoff(v[stand.rows], motion)).any())
+
+    def _choose_slide(self, stand: Standing, v: Array, m: Array, a: Array | None, t: Array) -> None:
+        """Who slides along the surface, and in which direction friction will work."""
+        if self.order == 1:
+            return
+        assert a is not None
+        rows, surface = stand.rows, stand.surface
+        _, motion = stand.motion(t)
+        relative = v[rows] - motion
+        relative -= rows_dot(relative, stand.normal)[:, None] * stand.normal
+        speed = lengths(relative)
+        speed = np.where(speed > _roundoff(v[rows], motion), speed, 0)
+        stand.speed, stand.slide = speed, directions(relative, speed, NONE)
+        if self.lagged:
+            push = a[rows] - surface.acceleration(t[rows])
+            along = push - rows_dot(push, stand.normal)[:, None] * stand.normal
+            pull = lengths(along)
+            slips = (speed == 0) & (pull * m[rows] > surface.friction * stand.load)
+            stand.slide = np.where(slips[:, None], directions(along, pull, NONE), stand.slide)
+        stand.sticks = (stand.slide == 0).all(axis=1)
+
+    # ------------------------------------------------------------------------------------------------ during the piece
+
+    def _look(self, stand: Standing, t: Any, x: Array, v: Array, m: Array) -> tuple[Array, Array]:
+        """The force that would move each along with the surface, and that which it takes to follow its bend."""
         surface, rows = stand.surface, stand.rows
         now = t[rows] if isinstance(t, np.ndarray) else t
         local = x[rows] - surface.at(now)
+        stand.normal = surface.local_normal(local)
+        stand.given = np.zeros((len(rows), 3))
+        if self.order == 1:
+            return np.broadcast_to(surface.velocity(now), local.shape), np.zeros(len(rows))
+        mass = m[rows]
+        bend = surface.bending(local, v[rows] - surface.velocity(now))
+        return mass[:, None] * surface.acceleration(now), mass * bend
+
+    def _bear(self, stand: Standing, carried: Array, bend: Array, f: Array) -> bool:
+        """Give each contact the force that it bears now; whether that is another than before."""
+        rows, normal = stand.rows, stand.normal
+        free = f[rows] - stand.given - carried
+        into = rows_dot(free, normal)
+        load = -(into + bend)
+        if self.lagged:
+            stand.pressed = np.ones(len(rows), bool)
+        else:
+            stand.pressed = load > 0
+            load = np.maximum(load, 0)
+        given = load[:, None] * normal
+        if self.order == 2 and stand.surface.friction > 0:
+            given = given + self._friction(stand, free - into[:, None] * normal, load)
+        change = given - stand.given
+        f[rows] += change
+        stand.given = given
+        return self._passes > 1 and bool((lengths(change) > SETTLED * lengths(given)).any())
+
+    def _friction(self, stand: Standing, along: Array, load: Array) -> Array:
+        """Friction against the force `along` a surface, or against the slide."""
+        if self.lagged:
+            most = stand.surface.friction * stand.load
+            stand.held = stand.sticks
+            hold = along
+        else:
+            most = stand.surface.friction * load
+            size = lengths(along)
+            stand.held = stand.sticks & (size <= most)
+            hold = np.minimum(most / np.where(size > 0, size, 1), 1)[:, None] * along
+        return -np.where(stand.sticks[:, None], hold, most[:, None] * stand.slide)
+
+    # ------------------------------------------------------------------------------------------------ at the end
+
+    def _hold(self, stand: Standing, x: Array, v: Array, t: Array, h: Array) -> None:
+        """Put those that friction held, or stopped, where they are to be."""
+        if self.order == 1 or stand.surface.friction == 0:
+            return
+        rows = stand.rows
+        place, motion = stand.motion(t)
+        went = h[rows] > 0
+        held = went & stand.held
+        x[rows] = np.where(held[:, None], stand.start + place, x[rows])
+        v[rows] = np.where(held[:, None], motion, v[rows])
+        now = rows_dot(v[rows] - motion, stand.slide)
+        stopped = went & (now < 0) & (stand.speed > 0)
+        way = 0.5 * h[rows] * stand.speed**2 / np.where(stopped, stand.speed - now, 1)  # until it stopped
+        beyond = rows_dot(x[rows] - place - stand.start, stand.slide) - way
+        x[rows] -= np.where(stopped, beyond, 0)[:, None] * stand.slide
+        v[rows] -= np.where(stopped, now, 0)[:, None] * stand.slide
+
+    def _put_back(self, stand: Standing, x: Array, v: Array, t: Array, h: Array, radius: Array) -> bool:
+        """Put those that are pressed on back on the surface, and those that sank out of it; whether there were any."""
+        rows, surface = stand.rows, stand.surface
+        place, motion = stand.motion(t)
+        local = x[rows] - place
         normal = surface.local_normal(local)
-        mass = m[rows, None] if self.order == 2 else np.ones((len(rows), 1), f.dtype)
-        relative = v[rows] - surface.velocity(now)
-        frame = surface.acceleration(now) if self.order == 2 else surface.velocity(now)
-        bend = surface.bending(local, relative) if self.order == 2 else 0
-        excess = f[rows] - mass * frame
-        load = -(rows_dot(excess, normal) + mass[:, 0] * bend)
-        load = load if self.lagged else np.maximum(load, 0)
-        stand.pressed |= self.lagged | (load > 0)
-        stand.normal = normal
-        f[rows] += load[:, None] * normal
-        if self.order == 2 and surface.friction > 0:
-            f[rows] += self._friction(stand, excess, normal, surface.friction * (stand.load if self.lagged else load))
-
-    def _friction(self, stand: Standing, excess: Array, normal: Array, most: Array) -> Array:
-        along = excess - rows_dot(excess, normal)[:, None] * normal
-        size = np.sqrt(rows_dot(along, along))
-        share = np.ones(len(size)) if self.lagged else np.minimum(most / np.where(size > 0, size, 1), 1)
-        hold = share[:, None] * along
-        sticks = (stand.slide == 0).all(axis=1)
-        return -np.where(sticks[:, None], hold, most[:, None] * stand.slide)
+        gap = surface.local_distance(local) - radius[rows] - stand.level
+        went = h[rows] > 0
+        on = went & (stand.pressed | (gap < 0))
+        off = np.where(on & ((gap < 0) | (gap > surface.eps)), gap, 0)
+        x[rows] -= off[:, None] * normal
+        if self.order == 2:
+            speed = rows_dot(v[rows] - motion, normal)
+            v[rows] -= np.where(on & (stand.pressed | (speed < 0)), speed, 0)[:, None] * normal
+        return bool((np.abs(off) > _roundoff(x[rows], place)).any())
 
 
-def _direction(v: Array, least: Array) -> Array:
-    """Unit vectors of rows that are longer than `least`, 0 for the others."""
-    size = np.sqrt(rows_dot(v, v))
-    moving = size > least
-    return np.where(moving[:, None], v / np.where(moving, size, 1)[:, None], 0)
+def _roundoff(v: Array, motion: Array) -> Array:
+    """Size of a difference between `v` and `motion` that is round-off, for each row."""
+    scale: Array = np.abs(v).max(axis=1) + np.abs(motion).max(axis=-1)
+    return STILL * np.finfo(v.dtype).eps * scale

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,14 +9,22 @@ from pointmass.collisions.collider import Array, Collider, rows_dot
 from pointmass.collisions.response import respond
 
 
-def bounce(surface: Collider, x: Array, v: Array, t: Any, radius: Array, moved: NDArray[np.bool_]) -> None:
-    """Respond where (X - P) . N < eps and N . V < 0; in place.
+def bounce(
+    surface: Collider, x: Array, v: Array, t: Array, radius: Array, moved: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Respond where (X - P) . N < eps and N . V < 0; in place. Returns who did.
 
     What has sunk in is put back on the surface, so that a soft bounce cannot leave it stuck below. A fast particle can jump
     through a thin wall between two tests: that is what `contact="swept"` is for.
     """
     gap = surface.distance(x, t) - radius
-    normal, motion = surface.normal(x, t), surface.velocity(t)
-    hit = moved & (gap < surface.eps) & (rows_dot(normal, v - motion) < 0)
-    v[hit] = respond(v, normal, motion, surface.restitution, surface.friction)[hit]
-    x[hit] -= np.minimum(gap, 0)[hit, None] * normal[hit]
+    hit = moved & (gap < surface.eps)
+    if hit.any():
+        rows = np.flatnonzero(hit)
+        normal, motion = surface.normal(x[rows], t[rows]), surface.velocity(t[rows])
+        hit[rows] = rows_dot(normal, v[rows] - motion) < 0
+        rows, normal = rows[hit[rows]], normal[hit[rows]]
+        motion = surface.velocity(t[rows])
+        v[rows] = respond(v[rows], normal, motion, surface.restitution, surface.friction)
+        x[rows] -= np.minimum(gap[rows], 0)[:, None] * normal
+    return hit

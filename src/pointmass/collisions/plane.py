@@ -38,14 +38,14 @@ class Plane(Collider):
         self.offset = 0.0
 
     def local_distance(self, x: Array) -> Array:
-        return rows_dot(x, self.direction.astype(x.dtype)) - x.dtype.type(self.offset)
+        return rows_dot(x, self.direction) - self.offset
 
     def local_normal(self, x: Array) -> Array:
-        return np.broadcast_to(self.direction.astype(x.dtype), x.shape)
+        return np.broadcast_to(self.direction, x.shape)
 
     def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:
         helper = np.eye(3)[int(np.argmin(np.abs(self.direction)))]
-        a = np.cross(self.direction, helper)
+        a = np.cross(helper, self.direction)
         a /= np.linalg.norm(a)
         b = np.cross(self.direction, a)
         corners = 0.5 * size * np.array([-a - b, a - b, a + b, b - a]) + self.offset * self.direction

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, Contact, rows_dot
+from pointmass.collisions.collider import Array, Collider, Contact, directions, lengths, rows_dot
 from pointmass.errors import InvalidInput, finite_array, number
 from pointmass.laws.parameter import Vector
 
@@ -40,13 +40,11 @@ class Polygon(Collider):
         self.direction, self.outward = self._frame()
 
     def local_distance(self, x: Array) -> Array:
-        d = x - self._nearest(x)
-        return np.sqrt(rows_dot(d, d)) - x.dtype.type(self.half)
+        return lengths(x - self._nearest(x)) - self.half
 
     def local_normal(self, x: Array) -> Array:
         d = x - self._nearest(x)
-        size = np.sqrt(rows_dot(d, d))[:, None]
-        return np.where(size > 0, d / np.where(size > 0, size, 1), self.direction.astype(x.dtype))
+        return directions(d, lengths(d), self.direction)
 
     def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:
         k = len(self.vertices)
@@ -90,4 +88,4 @@ class Polygon(Collider):
             d2 = rows_dot(x - point, x - point)
             closer = d2 < distance
             best, distance = np.where(closer[:, None], point, best), np.where(closer, d2, distance)
-        return best.astype(x.dtype)
+        return best

@@ -7,9 +7,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, Contact, rows_dot
+from pointmass.collisions.collider import Array, Collider, Contact, directions, lengths, rows_dot
 from pointmass.errors import number
 from pointmass.laws.parameter import Vector
+
+UP = np.array([0.0, 1.0, 0.0])  # at the very centre every direction is as good
 
 
 class Sphere(Collider):
@@ -42,18 +44,16 @@ class Sphere(Collider):
         self.sign = -1.0 if inside else 1.0
 
     def local_distance(self, x: Array) -> Array:
-        return x.dtype.type(self.sign) * (np.sqrt(rows_dot(x, x)) - x.dtype.type(self.radius))
+        return self.sign * (lengths(x) - self.radius)
 
     def local_normal(self, x: Array) -> Array:
-        r = np.sqrt(rows_dot(x, x))[:, None]
-        up = np.array([0, 1, 0], x.dtype)  # at the very centre every direction is as good
-        return x.dtype.type(self.sign) * np.where(r > 0, x / np.where(r > 0, r, 1), up)
+        return self.sign * directions(x, lengths(x), UP)
 
     def bending(self, x: Array, v: Array) -> Array:
         r2 = rows_dot(x, x)
         r2 = np.where(r2 > 0, r2, 1)
         across = rows_dot(v, v) - rows_dot(x, v) ** 2 / r2
-        return x.dtype.type(self.sign) * across / np.sqrt(r2)
+        return self.sign * across / np.sqrt(r2)
 
     def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:
         return sphere_mesh(self.radius)
@@ -62,11 +62,15 @@ class Sphere(Collider):
 def sphere_mesh(radius: float, rings: int = 32) -> tuple[Array, NDArray[np.int32]]:
     """A sphere of triangles between circles of latitude."""
     around = 2 * rings
-    latitude, longitude = np.linspace(0, np.pi, rings + 1), np.linspace(0, 2 * np.pi, around, endpoint=False)
+    latitude, longitude = np.linspace(0, np.pi, rings + 1)[1:-1], np.linspace(0, 2 * np.pi, around, endpoint=False)
     a, b = np.meshgrid(latitude, longitude, indexing="ij")
     corners = np.stack([np.sin(a) * np.cos(b), np.cos(a), np.sin(a) * np.sin(b)], axis=-1).reshape(-1, 3)
-    i, j = np.meshgrid(np.arange(rings), np.arange(around), indexing="ij")
+    north, south = len(corners), len(corners) + 1
+    i, j = np.meshgrid(np.arange(rings - 2), np.arange(around), indexing="ij")
     here, right = i * around + j, i * around + (j + 1) % around
     quads = np.stack([here, right, right + around, here + around], axis=-1).reshape(-1, 4)
-    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    return radius * corners, faces.astype(np.int32)
+    k, last = np.arange(around), (rings - 2) * around
+    top = np.stack([np.full(around, north), (k + 1) % around, k], axis=1)
+    bottom = np.stack([np.full(around, south), last + k, last + (k + 1) % around], axis=1)
+    faces = np.concatenate([top, quads[:, [0, 1, 2]], quads[:, [0, 2, 3]], bottom])
+    return radius * np.concatenate([corners, [UP, -UP]]), faces.astype(np.int32)

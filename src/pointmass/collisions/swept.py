@@ -8,15 +8,17 @@ the cubic itself. So nothing tunnels, at any speed, and the time of impact is ex
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, rows_dot
+from pointmass.collisions.collider import Array, Collider, lengths, rows_dot
 from pointmass.solvers.events import first_root
 
 MOST_CHORDS = 4096
 NEWTON_STEPS = 60
+SAMPLES = (0.0, 0.5, 1.0)  # of a step, where the acceleration of a moving surface is looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +29,7 @@ class Paths:
     ----------
     x0, v0, x1, v1 : positions [m] and velocities [m/s] at both ends, shape (k, 3).
     t0, h : start and length [s], shape (k,).
+    radius : of the particles [m], shape (k,).
     """
 
     x0: Array
@@ -35,99 +38,102 @@ class Paths:
     v1: Array
     t0: Array
     h: Array
+    radius: Array
 
     def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Paths:
         """Some of the paths."""
-        return Paths(self.x0[rows], self.v0[rows], self.x1[rows], self.v1[rows], self.t0[rows], self.h[rows])
+        return Paths(
+            self.x0[rows], self.v0[rows], self.x1[rows], self.v1[rows], self.t0[rows], self.h[rows], self.radius[rows]
+        )
+
+    def time(self, theta: Array) -> Array:
+        """Times at the fractions theta of the way [s], shape (k,)."""
+        return self.t0 + theta * self.h
 
     def position(self, theta: Array) -> Array:
         """Positions at the fractions theta of the way, shape (k, 3)."""
         s, h = theta[:, None], self.h[:, None]
         r = 1.0 - s
         ends = self.x0 * (r * r * (1.0 + 2.0 * s)) + self.x1 * (s * s * (3.0 - 2.0 * s))
-        return ends + h * (self.v0 * (s * r * r) - self.v1 * (s * s * r))
+        result: Array = ends + h * (self.v0 * (s * r * r) - self.v1 * (s * s * r))
+        return result
 
     def velocity(self, theta: Array) -> Array:
         """Velocities at the fractions theta of the way [m/s], shape (k, 3)."""
         s, h = theta[:, None], self.h[:, None]
         chord = (self.x1 - self.x0) / np.where(h > 0, h, 1)
-        return chord * (6.0 * s * (1.0 - s)) + self.v0 * ((1 - s) * (1 - 3 * s)) + self.v1 * (s * (3 * s - 2))
+        result: Array = chord * (6.0 * s * (1.0 - s)) + self.v0 * ((1 - s) * (1 - 3 * s)) + self.v1 * (s * (3 * s - 2))
+        return result
 
     def bends(self) -> Array:
         """Bound of the second derivative to theta [m], shape (k,)."""
         chord, h = self.x1 - self.x0, self.h[:, None]
         start, end = 6 * chord - h * (4 * self.v0 + 2 * self.v1), h * (2 * self.v0 + 4 * self.v1) - 6 * chord
-        return np.sqrt(np.maximum(rows_dot(start, start), rows_dot(end, end)))
+        return np.maximum(lengths(start), lengths(end))
 
+    @cached_property
     def reach(self) -> Array:
-        """Bound of the way from the start [m], shape (k,)."""
+        """Bound of the distance from the start [m], shape (k,): the length of the control polygon of Bezier."""
         a, c = self.h[:, None] * self.v0 / 3, self.h[:, None] * self.v1 / 3
-        b = self.x1 - self.x0 - a - c
-        return np.sqrt(rows_dot(a, a)) + np.sqrt(rows_dot(b, b)) + np.sqrt(rows_dot(c, c))
+        return lengths(a) + lengths(self.x1 - self.x0 - a - c) + lengths(c)
 
 
 class _Approach:
-    """Gap between paths and one surface, less what a particle had already sunk in at the start."""
+    """Gap between paths and one surface, above the level at which each starts if that is inside already."""
 
-    def __init__(self, surface: Collider, paths: Paths, radius: Array) -> None:
-        self.surface, self.paths, self.radius = surface, paths, radius
-        start = surface.distance(paths.x0, paths.t0) - radius
-        self.level = np.minimum(start, 0)
-        self.start = start - self.level
+    def __init__(self, surface: Collider, paths: Paths, level: Array) -> None:
+        self.surface, self.paths, self.level = surface, paths, level
 
     def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> _Approach:
-        part = _Approach.__new__(_Approach)
-        part.surface, part.paths = self.surface, self.paths.take(rows)
-        part.radius, part.level, part.start = self.radius[rows], self.level[rows], self.start[rows]
-        return part
+        return _Approach(self.surface, self.paths.take(rows), self.level[rows])
 
     def local(self, theta: Array) -> Array:
         """Position relative to the surface, shape (k, 3)."""
-        return self.paths.position(theta) - self.surface.at(self.paths.t0 + theta * self.paths.h)
+        return self.paths.position(theta) - self.surface.at(self.paths.time(theta))
 
     def gap(self, theta: Array) -> Array:
         return self.gap_at(self.local(theta))
 
     def gap_at(self, local: Array) -> Array:
-        return self.surface.local_distance(local) - self.radius - self.level
-
-    def near(self) -> NDArray[np.bool_]:
-        """Whether a path may come as far as the surface."""
-        p, s = self.paths, self.surface
-        way = p.reach()
-        if s.moves:
-            drift = s.at(p.t0 + p.h) - s.at(p.t0)
-            swing = np.maximum(*(rows_dot(a, a) for a in (s.acceleration(p.t0), s.acceleration(p.t0 + p.h))))
-            way = way + np.sqrt(rows_dot(drift, drift)) + np.sqrt(swing) * p.h**2
-        return self.start <= way
+        return self.surface.local_distance(local) - self.paths.radius - self.level
 
     def chords(self) -> NDArray[np.intp]:
         """How many chords stay within eps of each path."""
         bend = self.paths.bends()
         if self.surface.moves:
-            a = self.surface.acceleration(self.paths.t0)
-            bend = bend + np.sqrt(rows_dot(a, a)) * self.paths.h**2
+            bend = bend + _swing(self.surface, self.paths)
         return np.clip(np.ceil(np.sqrt(bend / (8 * self.surface.eps))), 1, MOST_CHORDS).astype(np.intp)
 
 
-def first_hit(surface: Collider, paths: Paths, radius: Array) -> Array:
+def first_hit(surface: Collider, paths: Paths) -> Array:
     """Fraction of the way at which each path first meets a surface, on its free side; inf where it does not.
 
     A particle that starts inside counts as on the surface: it may leave, and meets it when it sinks deeper.
     """
     theta = np.full(len(paths.h), np.inf)
-    everything = _Approach(surface, paths, radius)
-    rows = np.flatnonzero(everything.near())
+    start = surface.distance(paths.x0, paths.t0) - paths.radius
+    end = surface.distance(paths.x1, paths.t0 + paths.h) - paths.radius
+    level = np.minimum(start, 0)
+    way = paths.reach
+    if surface.moves:
+        way = way + lengths(surface.at(paths.t0 + paths.h) - surface.at(paths.t0)) + _swing(surface, paths)
+    rows = np.flatnonzero((start - level < way) | (end < level))
     if not len(rows):
         return theta
-    approach = everything.take(rows)
+    approach = _Approach(surface, paths.take(rows), level[rows])
     low, high = _brackets(approach)
     crossed = np.isfinite(high)
     if crossed.any():
-        inner = approach.take(crossed)
-        root = first_root(inner.gap, low[crossed], high[crossed])[0]
+        root = first_root(approach.take(crossed).gap, low[crossed], high[crossed])[0]
         theta[rows[crossed]] = np.where(np.isfinite(root), root, low[crossed])
     return theta
+
+
+def _swing(surface: Collider, paths: Paths) -> Array:
+    """About how far a surface gets away from uniform motion [m], shape (k,)."""
+    most = [lengths(surface.acceleration(paths.t0 + s * paths.h)) for s in SAMPLES]
+    result: Array = np.max(most, axis=0) * paths.h**2
+    return result
 
 
 def _brackets(approach: _Approach) -> tuple[Array, Array]:
@@ -142,11 +148,10 @@ def _brackets(approach: _Approach) -> tuple[Array, Array]:
             break
         end = np.minimum(j / chords, 1.0)
         b = approach.local(end)
-        deepest = np.where(approach.gap_at(b) < 0, 1.0, np.nan)
-        if approach.surface.bulges and (look := open_ & np.isnan(deepest)).any():
-            deepest[look] = _deepest(approach.take(look), a[look], b[look])
-        inside = start + deepest * (end - start)
-        sunk = open_ & ~np.isnan(deepest)
+        inside = np.where(approach.gap_at(b) < 0, end, np.nan)
+        if approach.surface.bulges and (look := open_ & np.isnan(inside)).any():
+            inside[look] = start[look] + _deepest(approach.take(look), a[look], b[look]) * (end - start)[look]
+        sunk = open_ & ~np.isnan(inside)
         sunk[sunk] = approach.take(sunk).gap(inside[sunk]) < 0
         low, high = np.where(sunk, start, low), np.where(sunk, inside, high)
         a, start = b, end

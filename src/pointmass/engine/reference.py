@@ -8,10 +8,12 @@ the step ballistically with its new velocity.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pointmass.collisions.collider import Collider
 from pointmass.collisions.contact import Contacts
 from pointmass.collisions.discrete import bounce
 from pointmass.collisions.response import respond
@@ -21,16 +23,26 @@ from pointmass.solvers.advance import Stats, advance
 from pointmass.solvers.base import Memory, Solver, Step
 from pointmass.system import ParticleSystem
 
+Rows = NDArray[np.intp]
+Mask = NDArray[np.bool_]
 MOST_EVENTS = 8  # impacts of one particle in one step; then it rests until the step ends
+EVICTIONS = 16  # passes that put back what other surfaces pushed into one
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A stretch of the last step: where everybody was between the clocks `t` and `t + h`, shape (dim,)."""
+    """A stretch of the last step: everybody between the clocks `t` and `t + h`, shape (dim,).
+
+    Attributes
+    ----------
+    step : as the solver made it.
+    moved : what the colliders did to its end, shape (dim,); 0 for islands that were set back to go on from there.
+    """
 
     step: Step
     t: Array
     h: Array
+    moved: Array | float
 
 
 @dataclass(eq=False)
@@ -40,22 +52,22 @@ class ReferenceEngine:
     Attributes
     ----------
     memory : what the solver remembers between steps.
-    pieces : of the last step, for looks in between.
     stats : work done so far.
     """
 
     system: ParticleSystem
     solver: Solver
     memory: Memory = field(default_factory=dict)
-    pieces: list[Piece] = field(default_factory=list)
     stats: Stats = field(default_factory=Stats)
 
     def __post_init__(self) -> None:
-        self._known: tuple[NDArray[np.int64], NDArray[np.intp]] | None = None
         surfaces = [s for c in self.system.colliders for s in c.surfaces]
-        self.swept = [s for s in surfaces if s.contact == "swept"]
-        self.discrete = [s for s in surfaces if s.contact == "discrete"]
-        self.contacts = Contacts(surfaces, self.system.order, self.solver.implicit) if surfaces else None
+        self._swept = [s for s in surfaces if s.contact == "swept"]
+        self._discrete = [s for s in surfaces if s.contact == "discrete"] if self.system.order == 2 else []
+        self._contacts = Contacts(surfaces, self.system.order, self.solver.implicit)
+        self._pieces: list[Piece] = []
+        self._ids = self.system.particles.id
+        self._islands = self.system.island_of_particle
 
     def step(self, t0: float, t1: float, births: Array | None = None) -> None:
         """Take the system from t0 to t1.
@@ -68,16 +80,19 @@ class ReferenceEngine:
         Raises
         ------
         Diverged
-            A number is no longer finite, or the solver cannot take its step.
+            A number is no longer finite, or the solver cannot take its step. The system keeps its state.
         """
         system = self.system
-        self.pieces = []
+        self._pieces = []
         self._fit_memory()
-        self._events = np.zeros(len(system.particles), np.intp)
-        self._alone = np.bincount(system.island_of_particle)[system.island_of_particle] == 1
+        self._ids, self._islands = system.particles.id, system.island_of_particle
+        self._events = np.zeros(len(self._ids), np.intp)
+        self._alone = np.bincount(self._islands)[self._islands] == 1
         clock = None if births is None else self._island_clock(births)
-        hooks = {"prepare": self._prepare, "correct": self._correct} if self.contacts else {"correct": self._keep_piece}
-        system.filter = self.contacts
+        self._began = system.particles.x.copy(), np.full(len(self._ids), t0) if births is None else births
+        hooks: dict[str, Any] = {"correct": self._watch}
+        if system.colliders:
+            hooks = {"prepare": self._prepare, "correct": self._collide}
         try:
             y, self.memory, stats = advance(
                 system, self.solver, t0, t1, system.get_state(), self.memory, clock=clock, **hooks
@@ -85,92 +100,96 @@ class ReferenceEngine:
         finally:
             system.filter = None
         self.stats = self.stats + stats
-        self._end, self._known = t1, (system.particles.id, system.island_of_particle)
         system.set_state(y, t1)
 
     def state_at(self, t: float) -> Array:
-        """State at a time within the last step: dense output, shape (dim,); nothing is changed."""
-        if t >= self._end or not self.pieces:
-            return self.system.get_state()
-        y = self.pieces[0].step.y0
-        for piece in self.pieces:
+        """State of the present particles at a time within the last step, shape (dim,): dense output; nothing is changed.
+
+        Particles that were born later are where they will be born.
+        """
+        system = self.system
+        if t >= system.t or not self._pieces:
+            return system.get_state()
+        y = self._pieces[0].step.y0
+        for piece in self._pieces:
             theta = (t - piece.t) / np.where(piece.h > 0, piece.h, 1)
             inside = (piece.h > 0) & (theta >= 0)
-            y = np.where(inside, piece.step.dense(np.clip(theta, 0, 1)), y)
-        return y
+            theta = np.clip(theta, 0, 1)
+            y = np.where(inside, piece.step.dense(theta) + theta * piece.moved, y)
+        if self._ids is system.particles.id:
+            return y
+        then, now = _match(self._ids, system.particles.id)
+        state = system.get_state()
+        _by_particle(state, system.order)[:, now] = _by_particle(y, system.order)[:, then]
+        return state
 
     def _fit_memory(self) -> None:
-        """Carry what the solver remembers over births and deaths: each particle, and each island, keeps its own."""
-        p = self.system.particles
-        if not self.memory or self._known is None or self._known[0] is p.id:
+        """Carry what the solver remembers over births, deaths and new links: each particle, and each island, keeps its own."""
+        system = self.system
+        ids, islands = system.particles.id, system.island_of_particle
+        if not self.memory or (self._ids is ids and self._islands is islands):
             return
-        ids, old_islands = self._known
-        islands = self.system.island_of_particle
-        then, now = _match(ids, p.id)
-        fresh = self.solver.start(self.system)
+        then, now = _match(self._ids, ids)
+        fresh = self.solver.start(system)
         for name, new in fresh.items():
             old = self.memory[name]
-            if len(new) == self.system.dim:
-                shape = (self.system.order, -1, 3)
-                new.reshape(shape)[:, now] = old.reshape(shape)[:, then]
+            if len(new) == system.dim:
+                _by_particle(new, system.order)[:, now] = _by_particle(old, system.order)[:, then]
             else:
-                new[islands[now]] = old[old_islands[then]]
+                new[islands[now]] = old[self._islands[then]]
         self.memory = fresh
 
     # ------------------------------------------------------------------------------------------------ hooks
 
     def _prepare(self, clock: Array, h: Array, y: Array) -> Array:
         """Before each piece: who stands on what."""
-        assert self.contacts is not None
-        system = self.system
+        system, contacts = self.system, self._contacts
         y = y.copy()
         x, v = system.split(y)
-        islands = system.island_of_particle
-        t = clock[islands]
+        t = clock[self._islands]
+        p = system.particles
+        system.filter = None
 
         def acceleration() -> Array:
             system.clear_forces()
-            system.filter = None
             system.calculate_forces(t, x, v)
-            system.filter = self.contacts
-            p = system.particles
             return p.f / p.m[:, None] if system.order == 2 else p.f.copy()
 
-        moving = (h[islands] > 0) & ~system.particles.pinned
-        self.contacts.find(x, v, system.particles.m, acceleration, t, system.particles.radius, moving)
+        contacts.find(x, v, p.m, acceleration, t, p.radius, (h[self._islands] > 0) & ~p.pinned)
+        system.filter = contacts if contacts.standing else None
         return y
 
-    def _keep_piece(self, step: Step, h: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-        n = len(h)
-        islands = self.system.islands
-        dim = len(islands)
-        self.pieces.append(Piece(step, np.broadcast_to(step.t, dim), h[islands]))
-        return step.y1, np.full(n, np.nan), np.zeros(n, bool)
+    def _watch(self, step: Step, h: Array) -> tuple[Array, Array, Mask]:
+        """After each piece without colliders: keep it for looks in between."""
+        self._keep(step, h, 0.0)
+        return step.y1, np.full(len(h), np.nan), np.zeros(len(h), bool)
 
-    def _correct(self, step: Step, h: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """After each piece: impacts."""
-        assert self.contacts is not None
-        system, p = self.system, self.system.particles
-        _, clock, reset = self._keep_piece(step, h)
-        islands = system.island_of_particle
+    def _keep(self, step: Step, h: Array, moved: Array | float) -> None:
+        length = np.tile(np.repeat(h[self._islands], 3), self.system.order)
+        self._pieces.append(Piece(step, np.broadcast_to(step.t, len(length)), length, moved))
+
+    def _collide(self, step: Step, h: Array) -> tuple[Array, Array, Mask]:
+        """After each piece: who stood is brought back to the surface, who hits something responds."""
+        system, p, islands = self.system, self.system.particles, self._islands
+        clock, reset = np.full(len(h), np.nan), np.zeros(len(h), bool)
         length = h[islands]
         start = np.broadcast_to(step.t, system.dim)[: 3 * len(p) : 3]
+        end = start + length
         y = step.y1.copy()
         x, v = system.split(y)
-        self.contacts.settle(x, v, start + length, p.radius)
+        self._contacts.settle(x, v, end, length, p.radius)
         moved = (length > 0) & ~p.pinned
-        for surface in self.discrete:
-            if system.order == 2:
-                bounce(surface, x, v, start + length, p.radius, moved)
-        rows = np.flatnonzero(moved) if self.swept else np.zeros(0, np.intp)
-        paths = self._paths(step, x, v, start, length).take(rows)
-        while len(rows):
-            theta, which = self._first_hits(paths, rows)
-            hit = np.isfinite(theta)
-            rows, paths, theta, which = rows[hit], paths.take(hit), theta[hit], which[hit]
-            rows, paths = self._respond(rows, paths, theta, which, x, v, clock)
-        reset[islands[moved & np.isfinite(clock[islands])]] = True
-        return (np.concatenate([x.ravel(), v.ravel()]) if system.order == 2 else x.ravel()), clock, reset
+        for surface in self._discrete:
+            reset[islands[bounce(surface, x, v, end, p.radius, moved)]] = True
+        if self._swept:
+            hit = self._impacts(self._paths(step, x, v, start, length), np.flatnonzero(moved), x, v, clock)
+            reset[islands[hit]] = True
+            now = np.where(np.isnan(clock[islands]), end, clock[islands])
+            self._evict(x, v, now, moved)
+        fix = y - step.y1
+        _by_particle(fix, system.order)[:, ~np.isnan(clock[islands])] = 0
+        self._keep(step, h, fix)
+        return y, clock, reset
 
     # ------------------------------------------------------------------------------------------------ impacts
 
@@ -178,57 +197,108 @@ class ReferenceEngine:
         """The cubics of all particles; those of a flow, which has no velocities, are straight."""
         x0, v0 = self.system.split(step.y0)
         if self.system.order == 1:
-            v0 = (x - x0) / np.where(length > 0, length, 1)[:, None]
-            return Paths(x0, v0, x, v0, start, length)
-        return Paths(x0, v0, x, v, start, length)
+            v0 = v = (x - x0) / np.where(length > 0, length, 1)[:, None]
+        return Paths(x0, v0, x, v, start, length, self.system.particles.radius)
 
-    def _first_hits(self, paths: Paths, rows: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+    def _impacts(self, paths: Paths, rows: Rows, x: Array, v: Array, clock: Array) -> Rows:
+        """Cast the paths and respond until nobody hits anything any more; returns who did. `x`, `v`, `clock` in place."""
+        paths, everyone = paths.take(rows), []
+        while len(rows):
+            theta, which = self._first_hits(paths, rows)
+            hit = np.isfinite(theta)
+            if not hit.any():
+                break
+            everyone.append(rows[hit])
+            rows, paths = self._respond(rows[hit], paths.take(hit), theta[hit], which[hit], x, v, clock)
+        return np.concatenate(everyone) if everyone else rows[:0]
+
+    def _first_hits(self, paths: Paths, rows: Rows) -> tuple[Array, Rows]:
         """Earliest hit of each path, and the number of the surface."""
-        assert self.contacts is not None
         theta, which = np.full(len(rows), np.inf), np.zeros(len(rows), np.intp)
-        for k, surface in enumerate(self.swept):
-            bound = [s.rows for s in self.contacts.standing if s.surface is surface]
-            look = ~np.isin(rows, bound[0]) if bound else np.ones(len(rows), bool)
-            hit = np.full(len(rows), np.inf)
-            hit[look] = first_hit(surface, paths.take(look), self.system.particles.radius[rows[look]])
+        for k, surface in enumerate(self._swept):
+            standing = self._contacts.on(surface)
+            if len(standing):
+                look = np.flatnonzero(~np.isin(rows, standing))
+                hit = np.full(len(rows), np.inf)
+                hit[look] = first_hit(surface, paths.take(look))
+            else:
+                hit = first_hit(surface, paths)
             earlier = hit < theta
             theta, which = np.where(earlier, hit, theta), np.where(earlier, k, which)
         return theta, which
 
     def _respond(
-        self, rows: NDArray[np.intp], paths: Paths, theta: Array, which: NDArray[np.intp], x: Array, v: Array, clock: Array
-    ) -> tuple[NDArray[np.intp], Paths]:
+        self, rows: Rows, paths: Paths, theta: Array, which: Rows, x: Array, v: Array, clock: Array
+    ) -> tuple[Rows, Paths]:
         """Put particles at their impact with their new velocity; returns those that fly on within this piece."""
-        place, speed, now = paths.position(theta), paths.velocity(theta), paths.t0 + theta * paths.h
+        place, speed, now = paths.position(theta), paths.velocity(theta), paths.time(theta)
         end = paths.t0 + paths.h
-        rest = np.zeros(len(rows), bool)
         self._events[rows] += 1
+        tired = self._events[rows] > MOST_EVENTS
         for k in np.unique(which):
-            surface, at = self.swept[k], which == k
+            surface, at = self._swept[k], which == k
             normal, motion = surface.normal(place[at], now[at]), surface.velocity(now[at])
-            tired = self._events[rows[at]] > MOST_EVENTS
-            after = respond(speed[at], normal, motion, surface.restitution, surface.friction)
-            stopped = respond(speed[at], normal, motion, 0.0, surface.friction)
-            speed[at] = np.where(tired[:, None], stopped, after)
-            rest[at] = tired
-        alone = self._alone[rows]
+            speed[at] = respond(speed[at], normal, motion, surface.restitution, surface.friction)
+            rest = at & tired
+            speed[rest] = surface.velocity(end[rest])
+            place[rest] += surface.at(end[rest]) - surface.at(now[rest])
         x[rows], v[rows] = place, speed
-        back = alone & ~rest
-        clock[self.system.island_of_particle[rows[back]]] = now[back]
-        fly = ~alone & ~rest & (now < end)
+        alone = self._alone[rows]
+        back = alone & ~tired
+        clock[self._islands[rows[back]]] = now[back]
+        fly = ~alone & ~tired & (now < end)
         left = (end - now)[fly]
         target = place[fly] + left[:, None] * speed[fly]
         x[rows[fly]] = target
-        return rows[fly], Paths(place[fly], speed[fly], target, speed[fly], now[fly], left)
+        return rows[fly], Paths(place[fly], speed[fly], target, speed[fly], now[fly], left, paths.radius[fly])
+
+    def _evict(self, x: Array, v: Array, t: Array, moved: Mask) -> None:
+        """Put out those whom one surface, or the end of their patience, pushed into another one; in place.
+
+        Who began the step inside may stay as deep. Where surfaces leave no room at all, as in a closing press, somebody
+        stays inside.
+        """
+        radius = self.system.particles.radius
+        for _ in range(EVICTIONS):
+            clean = True
+            for surface in self._swept:
+                gap = surface.distance(x, t) - radius
+                rows = np.flatnonzero(moved & (gap < 0))
+                if not len(rows):
+                    continue
+                sunk = np.minimum(gap[rows] - self._depth(surface, rows), 0)
+                normal = surface.normal(x[rows], t[rows])
+                x[rows] -= sunk[:, None] * normal
+                away = respond(v[rows], normal, surface.velocity(t[rows]), 0.0, 0.0)
+                v[rows] = np.where((sunk < 0)[:, None], away, v[rows])
+                clean = clean and not (sunk < -_roundoff(x[rows])).any()
+            if clean:
+                break
+
+    def _depth(self, surface: Collider, rows: Rows) -> Array:
+        """How deep in a surface particles were when the step began [m], at most 0, shape (k,)."""
+        x, clock = self._began
+        depth: Array = surface.distance(x[rows], clock[rows]) - self.system.particles.radius[rows]
+        return np.minimum(depth, 0)
 
     def _island_clock(self, births: Array) -> Array:
-        islands = self.system.island_of_particle
-        clock = np.full(int(islands.max(initial=-1)) + 1, -np.inf)
-        np.maximum.at(clock, islands, births)
+        clock = np.full(int(self._islands.max(initial=-1)) + 1, -np.inf)
+        np.maximum.at(clock, self._islands, births)
         return clock
 
 
-def _match(old: NDArray[np.int64], new: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _roundoff(x: Array) -> Array:
+    """Round-off of a distance at each row of positions."""
+    result: Array = 64 * np.finfo(x.dtype).eps * (1 + np.abs(x).max(axis=1))
+    return result
+
+
+def _by_particle(y: Array, order: int) -> Array:
+    """A vector of shape (dim,) seen as (order, n, 3)."""
+    return y.reshape(order, -1, 3)
+
+
+def _match(old: NDArray[np.int64], new: NDArray[np.int64]) -> tuple[Rows, Rows]:
     """Rows in `old` and in `new` of the ids that are in both."""
     _, then, now = np.intersect1d(old, new, assume_unique=True, return_indices=True)
     return then, now

@@ -213,7 +213,11 @@ class _Counted:
         self._system = system
         self.evaluations = 0
         self.dim, self.order = system.dim, system.order
-        self.velocity_dependent, self.islands = system.velocity_dependent, system.islands
+        self.islands = system.islands
+
+    @property
+    def velocity_dependent(self) -> bool:
+        return self._system.velocity_dependent  # contacts come and go between steps
 
     @property
     def inertia(self) -> Array:
