@@ -19,6 +19,8 @@ MARGIN = 1.12  # the picture is this much larger than what must be seen
 MANY = 1000  # a cloud with more rows than this is measured by its percentiles
 PERCENTILES = (1.0, 99.0)
 FARTHEST = 1e12  # [m]
+_STEPS = np.array([d for d in np.ndindex(5, 5, 5) if max(abs(k - 2) for k in d) == 2], np.float64) - 2.0
+DIRECTIONS = _STEPS / np.linalg.norm(_STEPS, axis=1)[:, None]  # 98 of them, evenly spread
 NEAR = 0.002  # nearest visible depth, as a fraction of the distance from the eye to the target
 
 
@@ -231,21 +233,15 @@ def _robust(rows: Vector, percentiles: bool) -> Vector:
         rows = rows[((rows[:, :3] >= low) & (rows[:, :3] <= high)).all(axis=1)]
     if len(rows) <= MANY:
         return rows
-    # The corners of the box hold every ball; a film has too many frames to keep all of them.
-    low, high = rows[:, :3].min(axis=0), rows[:, :3].max(axis=0)
-    corners = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1).reshape(-1, 3)
-    return np.concatenate([corners, np.full((8, 1), rows[:, 3].max())], axis=1)
+    # A film has too many frames to keep all balls: the outermost in many directions stand for the hull.
+    return rows[np.unique(np.argmax(rows[:, :3] @ DIRECTIONS.T + rows[:, 3:], axis=0))]
 
 
 def _near(meshes: Vector, found: Vector) -> Vector:
-    """Corners of static meshes, pulled into a box a little larger than the particles'."""
-    if not len(meshes):
-        return meshes
+    """Corners of static meshes within a box a little larger than the particles'; a floor's are far away."""
     low, high = (found[:, :3] - found[:, 3:]).min(axis=0), (found[:, :3] + found[:, 3:]).max(axis=0)
-    room = 0.1 * float(np.linalg.norm(high - low))
-    pulled = meshes.copy()
-    pulled[:, :3] = np.clip(meshes[:, :3], low - room, high + room)
-    return pulled
+    room = 0.25 * float(np.linalg.norm(high - low))
+    return meshes[((meshes[:, :3] >= low - room) & (meshes[:, :3] <= high + room)).all(axis=1)]
 
 
 def _triple(vector: Vector) -> tuple[float, float, float]:
