@@ -1,0 +1,130 @@
+"""Builders: counts, masses, lengths, groups, and putting bodies together."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import pointmass as pm
+from pointmass.bodies import BODIES, join
+from pointmass.description import parameters_of
+from pointmass.errors import InvalidInput
+from pointmass.forces import Springs
+
+EXAMPLES = {
+    "points": {"x": [[0, 0, 0], [1, 2, 3]], "attributes": {"charge": [1.0, -1.0]}},
+    "scatter": {"count": 12, "radius": 0.1, "radius_range": 0.05, "speed": 2.0},
+    "chain": {"links": 7, "length": 2.0, "mass": 3.0},
+    "lattice": {"counts": (3, 4, 5), "mass": 2.0},
+}
+
+
+def test_every_body_has_an_example() -> None:
+    assert EXAMPLES.keys() == BODIES.keys()
+
+
+@pytest.mark.parametrize("kind", BODIES)
+def test_body_remembers_how_it_was_built(kind: str) -> None:
+    built = BODIES[kind](**EXAMPLES[kind])
+    again = BODIES[built.kind](**built.arguments)
+    assert built.kind == kind
+    np.testing.assert_array_equal(again.particles.x, built.particles.x)
+    np.testing.assert_array_equal(again.particles.v, built.particles.v)
+    np.testing.assert_array_equal(again.particles.m, built.particles.m)
+    assert len(again.forces) == len(built.forces)
+
+
+@pytest.mark.parametrize("kind", BODIES)
+def test_body_starts_without_tension(kind: str) -> None:
+    built = BODIES[kind](**EXAMPLES[kind])
+    system = pm.ParticleSystem(built.particles, built.forces)
+    assert system.stretch() < 1e-12
+    assert np.abs(system.deriv_eval(0.0)[system.dim // 2 :]).max() < 1e-9
+
+
+@pytest.mark.parametrize("kind", BODIES)
+def test_body_refuses_what_it_does_not_know(kind: str) -> None:
+    with pytest.raises(InvalidInput, match="no parameter 'colour'"):
+        BODIES[kind](**EXAMPLES[kind], colour="red")
+    assert "colour" not in parameters_of(BODIES[kind])
+
+
+@given(links=st.integers(1, 40), mass=st.floats(1e-3, 1e3), held=st.sampled_from(["start", "end", "both", "none"]))
+def test_chain(links: int, mass: float, held: str) -> None:
+    built = pm.chain(links, 2.0, mass=mass, pinned=held, direction=(0, 3, 4), start=(1, 1, 1))
+    p = built.particles
+    assert len(p) == links + 1
+    free = ~p.pinned
+    if free.any():
+        assert p.m[free].sum() == pytest.approx(mass)
+    assert np.linalg.norm(p.x[-1] - p.x[0]) == pytest.approx(2.0)
+    np.testing.assert_allclose(p.x[-1], (1, 1 + 2 * 0.6, 1 + 2 * 0.8), rtol=1e-12)
+    assert int(p.pinned.sum()) == {"start": 1, "end": 1, "both": 2, "none": 0}[held]
+
+
+@pytest.mark.parametrize("shape", [(2, 2, 2), (3, 4, 5), (2, 6, 3)])
+def test_lattice_counts(shape: tuple[int, int, int]) -> None:
+    """Springs of each family against a plain double loop over all pairs."""
+    built = pm.lattice(shape, (1.0, 2.0, 3.0), mass=4.0, tilt=30.0)
+    grid = [(i, j, k) for i in range(shape[0]) for j in range(shape[1]) for k in range(shape[2])]
+    wanted = {1: set(), 2: set(), 3: set()}
+    for a, p in enumerate(grid):
+        for b in range(a):
+            d = [abs(x - y) for x, y in zip(p, grid[b], strict=True)]
+            if max(d) == 1:
+                wanted[sum(d)].add((b, a))
+    assert built.particles.m.sum() == pytest.approx(4.0)
+    for force, steps in zip(built.forces, (1, 2, 3), strict=True):
+        assert isinstance(force, Springs)
+        assert {tuple(sorted(pair)) for pair in force.ids.tolist()} == wanted[steps]
+        assert len(force.ids) == len(wanted[steps])
+
+
+def test_lattice_of_unequal_edges_keeps_each_spring_at_rest() -> None:
+    system_of = pm.lattice((3, 3, 3), (1.0, 2.0, 0.5), tilt=70.0)
+    assert pm.ParticleSystem(system_of.particles, system_of.forces).stretch() < 1e-12
+
+
+def test_scatter_is_inside_its_box_and_keyed_by_seed() -> None:
+    one, two = (pm.scatter(500, (1, 2, 3), (2, 0, 4), seed=s).particles for s in (1, 2))
+    assert (np.abs(one.x - (1, 2, 3)) <= (1, 0, 2)).all()
+    assert not np.array_equal(one.x, two.x)
+    more = pm.scatter(600, (1, 2, 3), (2, 0, 4), seed=1).particles
+    np.testing.assert_array_equal(more.x[:500], one.x)
+
+
+def test_join_shifts_springs_and_names_groups() -> None:
+    a, b = pm.chain(2, mass=1.0), pm.points([[5, 5, 5]], pinned=[0], attributes={"charge": 2.0})
+    c = pm.chain(1, pinned="end", mass=1.0)
+    particles, forces = join([a, b, c], ["rope", "star", "stick"], np.float32)
+    assert particles.dtype == np.float32
+    np.testing.assert_array_equal(particles.select("rope"), [0, 1, 2])
+    np.testing.assert_array_equal(particles.select("stick"), [4, 5])
+    np.testing.assert_array_equal(particles.pinned, [True, False, False, True, False, True])
+    np.testing.assert_array_equal(particles.column("charge"), [0, 0, 0, 2, 0, 0])
+    assert [f.ids.tolist() for f in forces] == [[[0, 1], [1, 2]], [[4, 5]]]
+    with pytest.raises(InvalidInput, match="different names"):
+        join([pm.chain(1), pm.chain(1)], ["a", "a"], np.float64)
+
+
+@pytest.mark.parametrize(
+    ("build", "sentence"),
+    [
+        (lambda: pm.chain(0), "links = 0"),
+        (lambda: pm.chain(3, -1.0), "length = -1.0"),
+        (lambda: pm.chain(3, pinned="middle"), "unknown value of pinned"),
+        (lambda: pm.chain(3, direction=(0, 0, 0)), "direction"),
+        (lambda: pm.lattice((1, 3, 3)), "at least 2 particles"),
+        (lambda: pm.lattice(size=(1, 0, 1)), "size"),
+        (lambda: pm.scatter(5, radius=0.1, radius_range=0.2), "radius_range = 0.2"),
+        (lambda: pm.points([[0, 0, np.nan]]), "x must be finite"),
+        (lambda: pm.points([[0, 0, 0]], m=0.0), "m = 0.0 of particle 0"),
+        (lambda: pm.points([[0, 0, 0]], pinned=[3]), "rows of particles"),
+        (lambda: pm.points(), "needs the parameter 'x'"),
+    ],
+)
+def test_bad_bodies_are_refused_in_one_sentence(build: object, sentence: str) -> None:
+    with pytest.raises(InvalidInput, match=sentence):
+        build()  # type: ignore[operator]
