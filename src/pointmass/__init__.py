@@ -33,7 +33,7 @@ _HOMES = {
     "pointmass.simulation": "Simulation",
     "pointmass.solvers": "SOLVERS Euler SymplecticEuler Midpoint Heun RK4 Leapfrog Yoshida4 BogackiShampine"
     " DormandPrince ImplicitEuler ImplicitMidpoint BDF2 Event FunctionSystem integrate",
-    "pointmass.stability": "Stability stability",
+    "pointmass.stability": "Stability",
     "pointmass.system": "ParticleSystem",
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names.split()}

@@ -16,7 +16,6 @@ from pointmass.look import Look, Stage
 from pointmass.particles import Array
 from pointmass.solvers import RK4, SymplecticEuler
 from pointmass.solvers.base import Solver
-from pointmass.stability import stability
 from pointmass.system import ParticleSystem
 
 DEFAULT_DT = 1 / 240  # 60 frames a second with 4 substeps
@@ -244,7 +243,7 @@ class Simulation:
             return None
         system.set_state(self._start)
         try:
-            return stability(system, self.solver).largest_safe_dt
+            return system.stability(self.solver).largest_safe_dt
         except InvalidInput:
             return None
         finally:

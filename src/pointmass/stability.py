@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,9 @@ from numpy.typing import NDArray
 from pointmass.errors import InvalidInput
 from pointmass.solvers.base import Solver
 from pointmass.solvers.stability import largest_safe_step
-from pointmass.system import ParticleSystem
+
+if TYPE_CHECKING:
+    from pointmass.system import ParticleSystem
 
 DENSE = 900  # up to this dimension all eigenvalues are computed, beyond it those of largest size
 WANTED = 12

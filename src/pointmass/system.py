@@ -14,6 +14,8 @@ from pointmass.errors import InvalidInput
 from pointmass.laws.elements import ConstraintForce
 from pointmass.laws.force import Blocks, Force
 from pointmass.particles import Array, Particles, Selection
+from pointmass.solvers.base import Solver
+from pointmass.stability import Stability, stability
 
 
 class Filter(Protocol):
@@ -230,6 +232,10 @@ class ParticleSystem:
                 relative = np.abs(length - rest)[rest > 0] / rest[rest > 0]
                 worst = max(worst, float(relative.max(initial=0.0)))
         return worst
+
+    def stability(self, solver: Solver) -> Stability:
+        """How large a step of a solver may be, from the eigenvalues of the forces as they are now."""
+        return stability(self, solver)
 
     def add(self, x: Any, v: Any = None, **columns: Any) -> NDArray[np.int64]:
         """Add particles (see `Particles.add`); every force without a selection acts on them too. Returns their ids."""

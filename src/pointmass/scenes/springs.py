@@ -43,7 +43,7 @@ class SpringsScene(ShippedScene):
         return Scene(
             name=self.name,
             summary=self.summary(),
-            dt=1 / 60 / max(4, math.ceil(fastest / 60 / (1.6 - self.damping_ratio))),
+            dt=1 / 60 / max(4, math.ceil(fastest / 60 / 2.4 * (1 + self.damping_ratio))),
             frames=300,
             solver=SymplecticEuler(),
             bodies=[
