@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -56,8 +58,9 @@ def load_grid(path: str | Path, *, variables: Sequence[str] | None = None, outsi
     except InvalidInput as error:
         raise InvalidInput(f"grid file {str(path)!r}: {error}") from None
     except ImportError as error:
+        missing = error.name or re.sub(r".*No module named '(\w+)'.*", r"\1", str(error))
         raise InvalidInput(
-            f'grid file {str(path)!r} needs the library {error.name}: pip install "pointmass[grids]"'
+            f'grid file {str(path)!r} needs the library {missing}: pip install "pointmass[grids]"'
         ) from None
     except (OSError, ValueError, KeyError, EOFError, BadZipFile, RuntimeError, TypeError) as error:
         raise InvalidInput(
@@ -75,9 +78,10 @@ def as_grid(grid: Grid | str | Path | None) -> Grid | None:
 
 
 def _read_npz(file: Path, names: list[str] | None) -> Contents:
-    with np.load(file, allow_pickle=False) as data:
-        if not hasattr(data, "files"):
-            raise InvalidInput("it holds one array, and a grid needs values, origin and spacing: use np.savez")
+    data = np.load(file, allow_pickle=False)
+    if isinstance(data, np.ndarray):
+        raise InvalidInput("it holds one array, and a grid needs values, origin and spacing: use np.savez")
+    with data:
         arrays = {name: data[name] for name in data.files}
     for name in ("origin", "spacing"):
         if name not in arrays:
@@ -111,8 +115,11 @@ def _read_netcdf(file: Path, names: list[str] | None) -> Contents:
 def _read_vti(file: Path, names: list[str] | None) -> Contents:
     import pyvista
 
-    mesh = pyvista.read(file)
-    if not isinstance(mesh, pyvista.ImageData) or mesh.n_points == 0:
+    with warnings.catch_warnings(record=True) as caught:  # VTK reads what it can and only warns
+        warnings.simplefilter("always")
+        mesh = pyvista.read(file)
+    broken = any("raised an error" in str(warning.message) for warning in caught)
+    if broken or not isinstance(mesh, pyvista.ImageData) or mesh.n_points == 0:
         raise InvalidInput("it is damaged, or holds no image data")
     if not np.allclose(mesh.direction_matrix, np.eye(3)):
         raise InvalidInput("its axes are turned: resample it to axes along x, y and z")
