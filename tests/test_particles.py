@@ -1,0 +1,177 @@
+"""Particles: columns, groups, births, deaths, and what is refused."""
+
+import numpy as np
+import pytest
+
+from pointmass.errors import InvalidInput
+from pointmass.particles import Particles
+
+X = np.arange(12.0).reshape(4, 3)
+
+
+def test_columns():
+    p = Particles(X, [1, 2, 3], [1, 2, 4, 8], 0.1, charge=5.0, heat=[1, 2, 3, 4])
+    assert len(p) == 4
+    np.testing.assert_array_equal(p.v, np.tile([1, 2, 3], (4, 1)))
+    np.testing.assert_array_equal(p.w, [1, 0.5, 0.25, 0.125])
+    np.testing.assert_array_equal(p.column("heat"), [1, 2, 3, 4])
+    np.testing.assert_array_equal(p.column("radius"), [0.1] * 4)
+    assert p.columns == ["m", "radius", "age", "charge", "heat"]
+    assert p.id.tolist() == [0, 1, 2, 3]
+    assert (p.f == 0).all()
+    assert "4, 0 pinned, float64" in repr(p)
+
+
+@pytest.mark.parametrize(
+    ("x", "expected"),
+    [([1, 2, 3], [[1, 2, 3]]), ([[1, 2]], [[1, 2, 0]]), ([1, 2], [[1, 2, 0]]), (np.zeros((0, 3)), np.zeros((0, 3)))],
+)
+def test_shapes_of_places(x, expected):
+    np.testing.assert_array_equal(Particles(x).x, expected)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32, "float32"])
+def test_precision(dtype):
+    p = Particles(X, m=2, charge=1, dtype=dtype)
+    p.add([[1, 2, 3]])
+    for column in (p.x, p.v, p.f, p.m, p.w, p.radius, p.age, p.column("charge")):
+        assert column.dtype == np.dtype(dtype)
+    assert p.id.dtype == np.int64
+
+
+def test_input_is_copied():
+    mine = X.copy()
+    p = Particles(mine)
+    mine[:] = -1
+    np.testing.assert_array_equal(p.x, X)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "hint"),
+    [
+        ({"x": [[1, 2, np.nan]]}, "x must be finite, but entry 0 is nan"),
+        ({"x": [[1, 2, 3], [1, 2, np.inf]]}, "entry 1 is inf"),
+        ({"x": [[1, 2, 3, 4]]}, "x must have shape (n, 3)"),
+        ({"x": [[1, 2, 3], [1, 2]]}, "x must be numbers of shape (n, 3)"),
+        ({"x": "text"}, "x must be numbers"),
+        ({"x": X, "v": np.zeros((3, 3))}, "v must have shape"),
+        ({"x": X, "v": [np.nan, 0, 0]}, "v must be finite"),
+        ({"x": X, "m": 0}, "m = 0.0 of particle 0 is not allowed: a mass is positive; to hold a particle, pin it"),
+        ({"x": X, "m": [1, 1, -1, 1]}, "of particle 2"),
+        ({"x": X, "m": [1, 2]}, "m must have shape"),
+        ({"x": X, "m": np.inf}, "m must be finite"),
+        ({"x": X, "radius": -1}, "radius = -1.0 is not allowed"),
+        ({"x": X, "charge": [1, 2]}, "charge must have shape"),
+        ({"x": X, "t": 1.0}, "particle attribute 't' is not allowed"),
+        ({"x": X, "age": 1.0}, "particle attribute 'age' is not allowed"),
+        ({"x": X, "dtype": np.int32}, "float64 or float32"),
+        ({"x": X, "dtype": np.float16}, "float64 or float32"),
+    ],
+)
+def test_refused(arguments, hint):
+    with pytest.raises(InvalidInput) as error:
+        Particles(**arguments)
+    assert hint in str(error.value)
+
+
+def test_births_get_new_ids():
+    p = Particles(X, charge=1.0)
+    p.tag("old", None)
+    assert p.add(X[:2], m=3.0).tolist() == [4, 5]
+    assert p.column("charge").tolist() == [1, 1, 1, 1, 0, 0]
+    assert p.groups["old"].tolist() == [True] * 4 + [False] * 2
+    p.remove([5])
+    assert p.add([[0, 0, 0]], charge=2.0).tolist() == [6]  # 5 is never used again
+    assert p.add([[0, 0, 0]], id=[100]).tolist() == [100]
+    assert p.add([[0, 0, 0]]).tolist() == [101]
+    with pytest.raises(InvalidInput, match="no other particle has"):
+        p.add([[0, 0, 0]], id=[2])
+    with pytest.raises(InvalidInput, match="no other particle has"):
+        p.add([[0, 0, 0], [1, 1, 1]], id=[200, 200])
+    with pytest.raises(InvalidInput, match="unknown particle attribute 'chrage': did you mean 'charge'"):
+        p.add([[0, 0, 0]], chrage=1.0)
+    assert len(p) == 8
+
+
+def test_a_refused_birth_changes_nothing():
+    p = Particles(X)
+    version = p.version
+    for arguments in ({"x": [[np.nan, 0, 0]]}, {"x": X, "m": -1}, {"x": X, "id": [0, 1, 2, 3]}):
+        with pytest.raises(InvalidInput):
+            p.add(**arguments)
+    assert (len(p), p.version) == (4, version)
+
+
+def test_removal_keeps_order_ids_and_bits():
+    p = Particles(X, X / 7, [1, 2, 3, 4], charge=[5, 6, 7, 8])
+    p.tag("pair", [1, 3])
+    p.remove([0, 2])
+    assert p.id.tolist() == [1, 3]
+    np.testing.assert_array_equal(p.v, X[[1, 3]] / 7)
+    assert p.column("charge").tolist() == [6, 8]
+    assert p.groups["pair"].tolist() == [True, True]
+    assert p.rows([3, 0, 1]).tolist() == [1, -1, 0]
+    p.remove(None)
+    assert len(p) == 0
+    assert p.rows([1]).tolist() == [-1]
+
+
+@pytest.mark.parametrize(
+    ("which", "rows"),
+    [
+        (None, [0, 1, 2, 3]),
+        ("pair", [1, 3]),
+        ([3, 1], [1, 3]),
+        ([1, 1], [1]),
+        ([-1], [3]),
+        (2, [2]),
+        ([], []),
+        ([True, False, True, False], [0, 2]),
+        (np.array([False] * 4), []),
+        (slice(0, 0), None),
+    ],
+)
+def test_selections(which, rows):
+    p = Particles(X)
+    p.tag("pair", [1, 3])
+    if rows is None:
+        with pytest.raises(InvalidInput):
+            p.select(which)
+    else:
+        assert p.select(which).tolist() == rows
+
+
+@pytest.mark.parametrize(
+    ("which", "hint"),
+    [
+        ("pear", "unknown group of particles 'pear': did you mean 'pair'"),
+        ([4], "whole numbers below 4"),
+        ([-5], "whole numbers below 4"),
+        ([0.5], "whole numbers below 4"),
+        ([True, False], "must have shape (4,)"),
+    ],
+)
+def test_selections_that_do_not_exist(which, hint):
+    p = Particles(X)
+    p.tag("pair", [1, 3])
+    with pytest.raises(InvalidInput) as error:
+        p.select(which)
+    assert hint in str(error.value)
+
+
+def test_pins():
+    p = Particles(X, X, [1, 2, 3, 4])
+    p.pin([1])
+    assert p.pinned.tolist() == [False, True, False, False]
+    assert (p.v[1] == 0).all()
+    assert p.m[1] == 2
+    np.testing.assert_array_equal(p.v[[0, 2, 3]], X[[0, 2, 3]])
+
+
+def test_every_change_of_structure_is_counted():
+    p = Particles(X)
+    seen = {p.version}
+    for change in (lambda: p.add(X), lambda: p.remove([0]), lambda: p.pin([0]), lambda: p.tag("a", [0])):
+        change()
+        assert p.version not in seen
+        seen.add(p.version)
