@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.collisions.collider import Collider
+from pointmass.collisions.plane import Plane
 from pointmass.errors import InvalidInput, finite_array, number, unknown, whole_number
 from pointmass.forces.springs import Springs
 from pointmass.frame import Arrows, Curves, Drawable, Points, Segments, Triangles
@@ -48,7 +49,8 @@ class Look:
     streamlines : integral curves of a flow, 0 = none.
     field_box : corners of the box in which arrows and integral curves are drawn [m]; None = that of the particles at the start.
     colliders : whether surfaces are drawn, in `collider_color`.
-    floor_size : edge of the part of an infinite plane that is drawn [m]; None = 3 times the scene.
+    floor_size : edge of the part of an infinite plane that is drawn [m]; None = 3 times the scene, and for a floor as
+        far as one can see.
     """
 
     particles: Literal["solid", "glow", "none"] = "solid"
@@ -130,7 +132,8 @@ class Look:
         return palette(self.palette, level, self.brightness)
 
     def _collider(self, collider: Collider, k: int, t: float, extent: float, frame: int) -> Triangles:
-        corners, faces = collider.mesh(self.floor_size or 3 * extent)
+        floor = isinstance(collider, Plane) and collider.direction[1] > 0.95
+        corners, faces = collider.mesh(self.floor_size or (200 if floor else 3) * extent)
         inside = getattr(collider, "sign", 1.0) < 0 or bool(getattr(collider, "walls", ()))
         color = linear(self.collider_color)
         color[3] = 0.12 if inside else 1.0  # one has to see into a room

@@ -62,9 +62,7 @@ class Bounce(ShippedScene):
             forces=[Gravity((0.0, -self.gravity, 0.0)), QuadraticDrag(self.air)],
             colliders=[Plane(**material), Polygon(np.round(ramp, 12), thickness=0.02, **material)],  # type: ignore[arg-type]
             camera=Camera(azimuth=22.0, elevation=16.0),
-            look=Look(
-                color_by="id", palette="spectrum", color_range=(0.0, 1.0), floor_size=80.0, collider_color="#4a5568"
-            ),
+            look=Look(color_by="id", palette="spectrum", color_range=(0.0, 1.0), collider_color="#4a5568"),
         )
 
     def check(self, frames: Sequence[Frame]) -> None:

@@ -67,7 +67,6 @@ class Fountain(ShippedScene):
                 palette="ice",
                 brightness=0.9,
                 trails=0.09,
-                floor_size=80.0,
                 collider_color="#303a4a",
             ),
         )

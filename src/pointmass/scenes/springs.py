@@ -61,7 +61,7 @@ class SpringsScene(ShippedScene):
             forces=[Gravity((0.0, -self.gravity, 0.0)), Drag(self.drag)],
             colliders=[Plane(restitution=self.restitution, friction=self.friction)],
             camera=Camera(azimuth=28.0, elevation=14.0),
-            look=Look(color="#ffc46b", spring_width=0.012 * self.size, floor_size=60 * self.size),
+            look=Look(color="#ffc46b", spring_width=0.012 * self.size),
         )
 
     def check(self, frames: Sequence[Frame]) -> None:
