@@ -24,14 +24,13 @@ def write_npz(path, **arrays):
 
 
 def write_netcdf(path, dims="xyz", values=VALUES, coordinates=AXES, names="uvw", **attributes):
-    pytest.importorskip("h5py")
     xarray = pytest.importorskip("xarray")
     order = ["time", *"xyz"] if values.ndim == 5 else list("xyz")
     coordinates = {k: v for k, v in coordinates.items() if k in order}
     if values.ndim == 5:
         coordinates = coordinates | {"time": ("time", [0.0, 2.0], attributes)}
     arrays = {n: xarray.DataArray(values[..., k], dims=order).transpose(*dims) for k, n in enumerate(names)}
-    xarray.Dataset(arrays, coordinates).to_netcdf(path, engine="h5netcdf")
+    xarray.Dataset(arrays, coordinates).to_netcdf(path)
     return str(path)
 
 
@@ -89,11 +88,10 @@ def test_netcdf_with_time_falling_axes_and_other_names(tmp_path):
 
 
 def test_netcdf_of_a_plane(tmp_path):
-    pytest.importorskip("h5py")
     xarray = pytest.importorskip("xarray")
     u = xarray.DataArray(VALUES[:, :, 0, 0], dims=["x", "y"])
     data = xarray.Dataset({"u": u, "v": 2 * u}, {"x": AXES["x"], "y": AXES["y"]})
-    data.to_netcdf(tmp_path / "plane.nc", engine="h5netcdf")
+    data.to_netcdf(tmp_path / "plane.nc")
     grid = load_grid(tmp_path / "plane.nc")
     assert grid.shape == (3, 4, 1)
     np.testing.assert_array_equal(grid.values[0, :, :, 0], VALUES[:, :, 0, :1] * [1, 2, 0])
