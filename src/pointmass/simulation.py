@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.emitters.emitter import Emitter
+from pointmass.emitters.emitter import Birth, Emitter
 from pointmass.engine.reference import ReferenceEngine
 from pointmass.errors import Diverged, InvalidInput, number, whole_number
 from pointmass.frame import Frame
@@ -44,7 +45,7 @@ class Simulation:
     Raises
     ------
     InvalidInput
-        dt that is not positive, something that is not a solver, an emitter in a flow.
+        dt that is not positive, something that is not a solver or an emitter.
 
     Examples
     --------
@@ -72,6 +73,9 @@ class Simulation:
         self.dt = number("dt", dt, above=0, unit="s")
         self.seed = whole_number("seed", seed, at_least=0)
         self.emitters = list(emitters)
+        for emitter in self.emitters:
+            if not isinstance(emitter, Emitter):
+                raise InvalidInput(f"emitters must be emitters, such as pm.Nozzle(), not {emitter!r}")
         self.look = look or Look()
         self.t0 = system.t
         self.steps = 0
@@ -79,7 +83,8 @@ class Simulation:
         self.engine = ReferenceEngine(system, solver)
         self._start = system.get_state()
         self._stage = Stage(self.look, system.particles.x)
-        self._lifetimes: dict[int, float] = {}
+        self._looks = self.t0, 0, 1.0  # time of a frame, how many were looked at from it on, and how many in a second
+        self._mortal, self._death = np.zeros(0, np.int64), np.zeros(0)  # who dies, and when [s]
         self._speed_limit = RUNAWAY * self._natural_speed()
 
     @property
@@ -97,34 +102,38 @@ class Simulation:
             largest stable dt.
         """
         for _ in range(whole_number("count", count, at_least=0)):
-            t0, t1 = self._grid(self.steps), self._grid(self.steps + 1)
-            births = self._bear(t0, t1)
-            before = self.system.get_state()
-            try:
-                self.engine.step(t0, t1, births)
-                self._check_speed(before)
-            except Diverged as error:
-                raise self._explained(error) from error
-            self.steps += 1
-            self._age(t0, t1, births)
+            self._step()
 
     def frames(self, count: int, fps: float = 60.0) -> Iterator[Frame]:
         """Run and look: `count` frames, the first one at once, then one every 1/fps s.
 
         A second call goes on where the first one ended. A frame that falls between two steps is interpolated (dense output); it
         changes no state, so the run is the same for any fps.
+
+        Raises
+        ------
+        InvalidInput
+            A count below 1, an fps that is not positive.
+        Diverged
+            As for `step`.
         """
         count = whole_number("frames", count, at_least=1)
         fps = number("fps", fps, above=0, unit="1/s")
         return self._frames(count, fps)
 
     def frame(self, number: int = 0, t: float | None = None) -> Frame:
-        """A look at the system now, or at a time within the last step."""
+        """A look at the system now, or at a time within the last step; its quantities are always those of now.
+
+        Raises
+        ------
+        InvalidInput
+            A time that is not within the last step.
+        """
         system, now = self.system, self.t if t is None else t
+        if not self._grid(max(self.steps - 1, 0)) <= now <= self.t:
+            raise InvalidInput(f"t = {t} is not allowed: only the last step, which ended at {self.t} s, can be looked at")
         p = system.particles
-        x, v = p.x, p.v
-        if t is not None and t < self.t:
-            x, v = system.split(self.engine.state_at(t))
+        x, v = system.split(self.engine.state_at(now)) if now < self.t else (p.x, p.v)
         self._stage.trails.remember(now, p.id, x)
         drawables = self.look.drawables(system, now, x, v, number, self._stage)
         return Frame(
@@ -153,40 +162,71 @@ class Simulation:
     def _grid(self, k: int) -> float:
         return self.t0 + k * self.dt  # never accumulated
 
+    def _step(self) -> None:
+        t0, t1 = self._grid(self.steps), self._grid(self.steps + 1)
+        old = len(self.system.particles)
+        born = [e.births(t0, t1, self.seed, f"{type(e).__name__} {k}") for k, e in enumerate(self.emitters)]
+        clock = self._bear(born, t0)
+        before, memory = self.system.get_state(), self.engine.memory
+        try:
+            self.engine.step(t0, t1, clock)
+            self._check_speed()
+        except Diverged as error:
+            self.system.set_state(before, t0)
+            self.engine.memory = memory
+            explained = self._explained(error)
+            self.system.remove(np.arange(old, len(self.system.particles)))
+            raise explained from error
+        self.steps += 1
+        self._age(t0, t1, clock)
+        self._bury(born, t1)
+
+    def _bear(self, born: Sequence[Birth], t0: float) -> Array | None:
+        """Add the particles that are born in a step; returns the clock of all particles, None if all begin at t0."""
+        clock = [np.full(len(self.system.particles), t0)]
+        for k, birth in enumerate(born):
+            if len(birth.number):
+                self.system.add(birth.x, birth.v, id=birth.ids(k), **birth.columns)
+                clock.append(np.maximum(birth.time, t0))
+        return np.concatenate(clock) if len(clock) > 1 else None
+
+    def _age(self, t0: float, t1: float, clock: Array | None) -> None:
+        age = self.system.particles.age
+        age += (t1 - (np.full(len(age), t0) if clock is None else clock)).astype(age.dtype)
+
+    def _bury(self, born: Sequence[Birth], t1: float) -> None:
+        """Take away those whose time has come by t1."""
+        for k, birth in enumerate(born):
+            mortal = np.isfinite(birth.lifetime)
+            if mortal.any():
+                self._mortal = np.append(self._mortal, birth.ids(k)[mortal])
+                self._death = np.append(self._death, (birth.time + birth.lifetime)[mortal])
+        dead = self._death <= t1
+        if dead.any():
+            rows = self.system.particles.rows(self._mortal[dead])
+            self.system.remove(rows[rows >= 0])
+            self._mortal, self._death = self._mortal[~dead], self._death[~dead]
+
     def _frames(self, count: int, fps: float) -> Iterator[Frame]:
         for _ in range(count):
-            n = self.frames_seen
-            time = self.t0 + n / fps
+            time = self._next_look(fps)
             k = (time - self.t0) / self.dt
             on_grid = abs(k - round(k)) < ON_GRID * max(1.0, k)
-            self.step(max(0, (round(k) if on_grid else int(np.ceil(k))) - self.steps))
-            self.frames_seen += 1
-            yield self.frame(n, self.t if on_grid else time)
+            steps = round(k) if on_grid else math.ceil(k)
+            self.step(max(0, steps - self.steps))
+            number, self.frames_seen = self.frames_seen, self.frames_seen + 1
+            yield self.frame(number, self._grid(steps) if on_grid else time)
 
-    def _bear(self, t0: float, t1: float) -> Array | None:
-        """Add the particles that are born in this step; returns the clock of all particles."""
-        births = [e.births(t0, t1, self.seed, f"{type(e).__name__} {k}") for k, e in enumerate(self.emitters)]
-        if not any(len(b.number) for b in births):
-            return None
-        clock = [np.full(len(self.system.particles), t0)]
-        for k, birth in enumerate(births):
-            ids = self.system.add(birth.x, birth.v, id=birth.ids(k), **birth.columns)
-            mortal = np.isfinite(birth.lifetime)
-            self._lifetimes |= dict(zip(ids[mortal].tolist(), birth.lifetime[mortal].tolist(), strict=True))
-            clock.append(np.maximum(birth.time, t0))
-        return np.concatenate(clock)
-
-    def _age(self, t0: float, t1: float, births: Array | None) -> None:
-        p = self.system.particles
-        p.age += (t1 - (np.full(len(p), t0) if births is None else births)).astype(p.dtype)
-        if not self._lifetimes:
-            return
-        limit = np.array([self._lifetimes.get(i, np.inf) for i in p.id.tolist()])
-        dead = p.age >= limit
-        if dead.any():
-            for i in p.id[dead].tolist():
-                del self._lifetimes[i]
-            self.system.remove(dead)
+    def _next_look(self, fps: float) -> float:
+        """When the next frame is due [s]: now if it is the first one, or if the run has gone past it."""
+        since, looks, rate = self._looks
+        if fps != rate and looks:
+            since, looks = since + (looks - 1) / rate, 1
+        time = since + looks / fps
+        if time < (self.t if looks == 0 else self._grid(self.steps - 1)):
+            since, looks, time = self.t, 0, self.t
+        self._looks = since, looks + 1, fps
+        return time
 
     def _velocities(self, t: float, x: Array, v: Array) -> Array:
         """Velocities of a frame; in a flow they are the field's."""
@@ -207,10 +247,9 @@ class Simulation:
         size = float(np.abs(rate[np.isfinite(rate)]).max(initial=0.0))
         return max(1.0, extent, size, float(np.abs(p.v).max(initial=0.0)))
 
-    def _check_speed(self, before: Array) -> None:
+    def _check_speed(self) -> None:
         p = self.system.particles
         if np.abs(p.v).max(initial=0.0) > self._speed_limit or np.abs(p.x).max(initial=0.0) > 1e3 * self._speed_limit:
-            self.system.set_state(before, self._grid(self.steps))
             raise Diverged("speeds grow without bound")
 
     def _explained(self, error: Diverged) -> Diverged:
@@ -239,9 +278,7 @@ class Simulation:
         """From the stiffnesses at the start of the run, before anything was torn apart."""
         system = self.system
         now = system.get_state()
-        if self._start.shape != now.shape:
-            return None
-        system.set_state(self._start)
+        system.set_state(self._start if self._start.shape == now.shape else now)
         try:
             return system.stability(self.solver).largest_safe_dt
         except InvalidInput:

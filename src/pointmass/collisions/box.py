@@ -50,17 +50,16 @@ class Box(Collider):
 
     def local_distance(self, x: Array) -> Array:
         if self.walls:
-            return np.min(self.half - np.abs(x), axis=1)
-        q = np.abs(x) - self.half
+            nearest: Array = np.min(self.half - np.abs(x), axis=1)
+            return nearest
+        q: Array = np.abs(x) - self.half
         return lengths(np.maximum(q, 0)) + np.minimum(q.max(axis=1), 0)
 
     def local_normal(self, x: Array) -> Array:
-        q = np.abs(x) - self.half
-        face = np.eye(3)[np.argmax(q, axis=1)]
-        if self.walls:
-            return np.where(x < 0, face, -face)
+        q: Array = np.abs(x) - self.half
         out = np.maximum(q, 0)
-        n = directions(out, lengths(out), face)
+        face = np.eye(3)[np.argmax(q, axis=1)]
+        n = -face if self.walls else directions(out, lengths(out), face)
         return np.where(x < 0, -n, n)
 
     def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:

@@ -102,7 +102,8 @@ class _Approach:
         bend = self.paths.bends()
         if self.surface.moves:
             bend = bend + _swing(self.surface, self.paths)
-        return np.clip(np.ceil(np.sqrt(bend / (8 * self.surface.eps))), 1, MOST_CHORDS).astype(np.intp)
+        count: NDArray[np.intp] = np.ceil(np.sqrt(bend / (8 * self.surface.eps))).clip(1, MOST_CHORDS).astype(np.intp)
+        return count
 
 
 def first_hit(surface: Collider, paths: Paths) -> Array:

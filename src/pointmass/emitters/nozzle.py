@@ -6,11 +6,15 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pointmass import random
 from pointmass.collisions.collider import unit
 from pointmass.emitters.emitter import Array, Birth, Emitter
 from pointmass.errors import InvalidInput, finite_array, number
+
+BLOCK = 256  # births that are drawn at once
+NOTHING = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
 
 
 class Nozzle(Emitter):
@@ -63,10 +67,26 @@ class Nozzle(Emitter):
         self.start = number("start", start, unit="s")
         self.stop = math.inf if stop == math.inf else number("stop", stop, above=self.start, unit="s")
         if self.lifetime_range >= self.lifetime:
-            raise InvalidInput(f"lifetime_range = {lifetime_range} is not allowed: it must be less than lifetime = {lifetime} [s]")
+            raise InvalidInput(
+                f"lifetime_range = {lifetime_range} is not allowed: it must be less than lifetime = {lifetime} [s]"
+            )
+        self._kept: tuple[tuple[int, int, str], tuple[Array, Array, Array]] | None = None
 
     def births(self, t0: float, t1: float, seed: int, stream: str) -> Birth:
-        k = np.arange(self._first(t0), self._first(min(t1, self.stop)))
+        k = np.arange(self._first(t0), self._first(min(t1, self.stop)), dtype=np.int64)
+        drawn = [self._block(int(b), seed, stream) for b in np.unique(k // BLOCK)] if len(k) else [NOTHING]
+        mine = slice(int(k[0] % BLOCK), int(k[0] % BLOCK) + len(k)) if len(k) else slice(0)
+        x, v, lifetime = (np.concatenate(parts)[mine] for parts in zip(*drawn, strict=True))
+        return Birth(self.start + k / self.rate, k, x, v, lifetime, {"m": self.mass, "radius": self.size})
+
+    def _block(self, block: int, seed: int, stream: str) -> tuple[Array, Array, Array]:
+        """Places, velocities and lifetimes of BLOCK successive births; the last block is kept."""
+        key = block, seed, stream
+        if self._kept is None or self._kept[0] != key:
+            self._kept = key, self._draw(np.arange(block * BLOCK, (block + 1) * BLOCK), seed, stream)
+        return self._kept[1]
+
+    def _draw(self, k: NDArray[np.int64], seed: int, stream: str) -> tuple[Array, Array, Array]:
         axes = self._axes()
         spot = random.uniform(seed, stream, k, "place")
         aim = random.uniform(seed, stream, k, "direction")
@@ -79,9 +99,7 @@ class Nozzle(Emitter):
             lifetime = random.spread(seed, stream, k, "lifetime", self.lifetime, self.lifetime_range)
         x = self.position + np.outer(r * np.cos(a), axes[0]) + np.outer(r * np.sin(a), axes[1])
         way = np.outer(across * np.cos(b), axes[0]) + np.outer(across * np.sin(b), axes[1])
-        v = speed[:, None] * (way + np.outer(height, self.direction))
-        columns = {"m": self.mass, "radius": self.size}
-        return Birth(self.start + k / self.rate, k.astype(np.int64), x, v, lifetime, columns)
+        return x, speed[:, None] * (way + np.outer(height, self.direction)), lifetime
 
     def _first(self, t: float) -> int:
         """Number of the first birth that is not before t."""

@@ -124,7 +124,7 @@ class ReferenceEngine:
         return state
 
     def _fit_memory(self) -> None:
-        """Carry what the solver remembers over births, deaths and new links: each particle, and each island, keeps its own."""
+        """Carry what the solver remembers over births, deaths and new links: every particle and island keeps its own."""
         system = self.system
         ids, islands = system.particles.id, system.island_of_particle
         if not self.memory or (self._ids is ids and self._islands is islands):
@@ -201,7 +201,7 @@ class ReferenceEngine:
         return Paths(x0, v0, x, v, start, length, self.system.particles.radius)
 
     def _impacts(self, paths: Paths, rows: Rows, x: Array, v: Array, clock: Array) -> Rows:
-        """Cast the paths and respond until nobody hits anything any more; returns who did. `x`, `v`, `clock` in place."""
+        """Cast the paths and respond until nobody hits anything; returns who did. `x`, `v`, `clock` in place."""
         paths, everyone = paths.take(rows), []
         while len(rows):
             theta, which = self._first_hits(paths, rows)
@@ -273,7 +273,17 @@ class ReferenceEngine:
                 v[rows] = np.where((sunk < 0)[:, None], away, v[rows])
                 clean = clean and not (sunk < -_roundoff(x[rows])).any()
             if clean:
-                break
+                return
+        self._send_back(x, v, t, moved)
+
+    def _send_back(self, x: Array, v: Array, t: Array, moved: Mask) -> None:
+        """Whom surfaces push to and fro in a narrow corner rests where it was when the step began."""
+        for surface in self._swept:
+            rows = np.flatnonzero(moved)
+            gap = surface.distance(x[rows], t[rows]) - self.system.particles.radius[rows]
+            stuck = gap < self._depth(surface, rows) - _roundoff(x[rows])
+            x[rows[stuck]] = self._began[0][rows[stuck]]
+            v[rows[stuck]] = surface.velocity(t[rows[stuck]])
 
     def _depth(self, surface: Collider, rows: Rows) -> Array:
         """How deep in a surface particles were when the step began [m], at most 0, shape (k,)."""

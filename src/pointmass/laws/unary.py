@@ -52,10 +52,9 @@ class UnaryForce(Force):
         _ = self.traced
 
     def add_forces(self, particles: Particles, t: Any, x: Array, v: Array, f: Array) -> None:
-        rows = particles.select(self.on)
-        where = slice(None) if self.on is None else rows
+        rows = slice(None) if self.on is None else particles.select(self.on)
         for axis, part in enumerate(self.traced.columns(*self._inputs(self.traced, particles, t, x, v, rows))):
-            f[where, axis] += part
+            f[rows, axis] += part
 
     def add_jacobian(self, particles: Particles, t: Any, x: Array, v: Array, blocks: Blocks) -> None:
         rows = particles.select(self.on)
