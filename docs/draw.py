@@ -1,0 +1,209 @@
+"""Draws the pictures of the documentation into docs/images: `python docs/draw.py` for all, or with names for some."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+import pointmass as pm
+from pointmass.look import linear
+from pointmass.render import Style, image
+
+FOLDER = Path(__file__).parent / "images"
+SIZE = (640, 360)
+FACE_ON = pm.Camera(azimuth=0.0, elevation=0.0, fov=20.0)
+RED, YELLOW, BLUE, GREEN, GREY = (linear(c) for c in ("#ff6b6b", "#ffd23f", "#5fa8ff", "#5fe3a1", "#5b6678"))
+
+
+def curve(name, points, color, width=0.02):
+    """A line through points, shape (k, 2) or (k, 3)."""
+    points = np.asarray(points, np.float32)
+    if points.shape[1] == 2:
+        points = np.column_stack([points, np.zeros(len(points), np.float32)])
+    ends = np.array([0, len(points)], np.int32)
+    index = np.arange(len(points), dtype=np.int32)
+    return pm.Curves(name=name, vertices=points, index=index, offsets=ends, width=width, color=color)
+
+
+def dots(name, points, color, radius):
+    """Balls at points."""
+    points = np.asarray(points, np.float32)
+    return pm.Points(name=name, vertices=np.pad(points, ((0, 0), (0, 3 - points.shape[1]))), color=color, radius=radius)
+
+
+def drawing(*drawables):
+    """A frame of curves and dots alone."""
+    nothing = np.zeros((0, 3))
+    return pm.Frame(number=0, time=0.0, ids=np.zeros(0, int), positions=nothing, velocities=nothing, drawables=drawables)
+
+
+def save(name, frame, camera=FACE_ON, style=None):
+    """Draw a frame into docs/images."""
+    picture = image(frame, camera=camera, size=SIZE, style=style)
+    target = FOLDER / f"{name}.png"
+    small = Image.fromarray(picture).quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.FLOYDSTEINBERG)
+    small.save(target, optimize=True)
+    print(f"{target.name}: {target.stat().st_size / 1000:.0f} kB")
+
+
+def last(frames):
+    """The last of some frames."""
+    for frame in frames:
+        pass
+    return frame
+
+
+def shipped(name, count, size=SIZE, **settings):
+    """A frame of a scene that comes with pointmass, seen by its own camera."""
+    scene = pm.SCENES[name](**settings).build()
+    save(f"scene-{name}", last(scene.simulation().frames(count, scene.fps)), scene.camera)
+
+
+# ---------------------------------------------------------------------------------------------------- the lecture
+
+
+def flow():
+    """Arrows, integral curves and particles of two vortices."""
+    start = np.column_stack([np.linspace(-1.4, 1.4, 22), np.full(22, -0.45), np.zeros(22)])
+    system = pm.ParticleSystem(
+        pm.Particles(start), [pm.Vortex(2.0, (-0.6, 0, 0), eps=0.2), pm.Vortex(-2.0, (0.6, 0, 0), eps=0.2)]
+    )
+    box = ((-1.6, -0.9, 0.0), (1.6, 0.9, 0.0))
+    look = pm.Look(arrows=24, streamlines=60, field_box=box, size=0.03, trails=1.2)
+    save("flow", last(pm.Simulation(system, look=look).frames(90, 60)))
+
+
+def euler():
+    """Euler's method on a circle."""
+    t = np.linspace(0, 2 * np.pi, 200)
+    lines = [curve("circle", np.stack([np.cos(t), np.sin(t)], axis=1), GREY, 0.025)]
+    swirl = pm.ParticleSystem(pm.Particles([1.0, 0, 0]), [pm.Flow(("-y", "x", "0"))])
+    for dt, color in ((0.1, GREEN), (0.25, YELLOW), (0.5, RED)):
+        y = pm.integrate(swirl, pm.Euler(), (0.0, 2 * np.pi), dt).y
+        lines += [curve(f"euler {dt}", y, color), dots(f"steps {dt}", y, color, 0.035)]
+    save("euler", drawing(*lines))
+
+
+def phase():
+    """Three methods in the phase space of an oscillator."""
+    spring = pm.ParticleSystem(pm.Particles([1.0, 0, 0]), [pm.Harmonic(k_s=1.0)])
+    lines = []
+    for solver, color, steps in (
+        (pm.Euler(), RED, 38),
+        (pm.SymplecticEuler(), YELLOW, 300),
+        (pm.ImplicitEuler(), BLUE, 60),
+    ):
+        y = pm.integrate(spring, solver, (0.0, 0.2 * steps), 0.2).y[:, [0, 3]]
+        lines += [curve(solver.name, y, color), dots(f"{solver.name} steps", y, color, 0.03)]
+    save("phase", drawing(*lines))
+
+
+def drag():
+    """Throws with and without drag, each from the same place."""
+    lines = []
+    for k, color in ((0.0, YELLOW), (0.4, GREEN), (0.8, BLUE), (1.6, RED)):
+        stone = pm.Particles([0, 0, 0], v=[6.5, 6.5, 0])
+        system = pm.ParticleSystem(stone, [pm.Gravity(), pm.Drag(k)])
+        ground = pm.Event(lambda t, y: y[1], terminal=True, direction=-1)
+        path = pm.integrate(system, pm.RK4(), (0, 3), 0.05, events=[ground]).y
+        lines += [curve(f"throw {k}", path[:, :2], color, 0.05), dots(f"steps {k}", path[:, :2], color, 0.07)]
+    save("drag", drawing(curve("ground", [(-0.3, 0), (9.3, 0)], GREY, 0.04), *lines))
+
+
+def bounces():
+    """A ball that bounces along."""
+    ball = pm.Particles([-2.2, 1.3, 0], v=[1.1, 0, 0], radius=0.06)
+    floor = pm.Plane(restitution=0.8, friction=0.0)
+    look = pm.Look(trails=10.0, size=0.06, floor_size=40.0)
+    sim = pm.Simulation(pm.ParticleSystem(ball, [pm.Gravity()], [floor]), pm.Leapfrog(), look=look)
+    frames = list(sim.frames(245, 60))
+    path = np.array([f.positions[0] for f in frames])
+    lines = (curve("path", path, YELLOW, 0.02), dots("balls", path[::6], linear("#ffb454"), 0.06))
+    surface = [d for d in frames[0].drawables if d.kind == "triangles"]
+    save("bounces", drawing(*surface, *lines), pm.Camera(azimuth=0, elevation=6, fov=25, target=(0, 0.6, 0), position=(0, 1.2, 9)))
+
+
+def cloth():
+    """The lecture's cloth, hanging from two corners."""
+    n = 9
+    grid = np.arange(n * n).reshape(n, n)
+
+    def join(a, b):
+        return np.stack([a.ravel(), b.ravel()], axis=1)
+
+    families = {
+        "stretch": [join(grid[1:], grid[:-1]), join(grid[:, 1:], grid[:, :-1])],
+        "shear": [join(grid[1:, 1:], grid[:-1, :-1]), join(grid[1:, :-1], grid[:-1, 1:])],
+        "bend": [join(grid[2:], grid[:-2]), join(grid[:, 2:], grid[:, :-2])],
+    }
+    row, column = np.divmod(grid.ravel(), n)
+    particles = pm.Particles(np.stack([column, 0 * row, row], axis=1) / (n - 1), m=1 / n**2, radius=0.012)
+    particles.pin([0, n - 1])
+    springs = [pm.Springs(np.concatenate(pairs), 100.0, 0.02, family=name) for name, pairs in families.items()]
+    system = pm.ParticleSystem(particles, [pm.Gravity(), pm.Drag(0.01), *springs])
+    sim = pm.Simulation(system, pm.SymplecticEuler(), dt=1 / 300, look=pm.Look(spring_width=0.006, color="#e8edf5"))
+    save("cloth", last(sim.frames(40, 60)), pm.Camera(azimuth=55, elevation=25))
+
+
+# ---------------------------------------------------------------------------------------------------- extending, scenes
+
+
+def capsule():
+    """Sparks on the collider of docs/extending.md."""
+    page = (FOLDER.parent / "extending.md").read_text(encoding="utf-8")
+    source = page.split("<!-- capsule -->\n```python\n")[1].split("```")[0]
+    names: dict = {"pm": pm, "np": np}
+    exec(source, names)  # the page's own class
+    rail = names["Capsule"](a=(-0.7, 0.5, 0), b=(0.7, 0.9, 0), radius=0.15, restitution=0.6)
+    scene = pm.Scene(
+        dt=1 / 120,
+        solver=pm.Leapfrog(),
+        emitters=[pm.Nozzle((0.35, 2.0, 0), (0, -1, 0), rate=500.0, speed=2.0, cone=6.0, radius=0.1, lifetime=1.6)],
+        forces=[pm.Gravity()],
+        colliders=[rail, pm.Plane(restitution=0.3)],
+        look=pm.Look(particles="glow", size=0.018, color_by="speed", trails=0.06, floor_size=40.0),
+    )
+    save("capsule", last(scene.simulation().frames(120, 60)), pm.Camera(azimuth=12, elevation=10))
+
+
+def pendulum():
+    """The shipped scene pendulum."""
+    shipped("pendulum", 66)
+
+
+def bounce():
+    """The shipped scene bounce."""
+    shipped("bounce", 75)
+
+
+def flow_scene():
+    """The shipped scene flow."""
+    shipped("flow", 300)
+
+
+def orbit():
+    """The shipped scene orbit."""
+    shipped("orbit", 200)
+
+
+def springs():
+    """The shipped scene springs."""
+    shipped("springs", 48)
+
+
+def fountain():
+    """The shipped scene fountain."""
+    shipped("fountain", 170)
+
+
+PICTURES = (flow, euler, phase, drag, bounces, cloth, capsule, pendulum, bounce, flow_scene, orbit, springs, fountain)
+
+
+if __name__ == "__main__":
+    FOLDER.mkdir(exist_ok=True)
+    for draw in PICTURES:
+        if len(sys.argv) == 1 or draw.__name__ in sys.argv[1:]:
+            draw()
