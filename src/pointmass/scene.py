@@ -1,12 +1,11 @@
 """The description of a scene: in Python, as text (TOML), and from either a simulation.
 
-A scene is bodies, forces, colliders, emitters, a solver, a camera and a look. Each object remembers how it was made, so a scene
-written in Python can be saved as text, and a text gives the same scene back.
+A scene is bodies, forces, colliders, emitters, a solver, a camera and a look. Each object remembers how it was made,
+so a scene written in Python can be saved as text, and a text gives the same scene back.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -14,25 +13,29 @@ from typing import Any
 
 import numpy as np
 
-from pointmass.bodies.body import BODIES, Body, join
+from pointmass.bodies import BODIES, Body, join
 from pointmass.collisions import COLLIDERS
 from pointmass.collisions.collider import Collider
 from pointmass.description import Described
 from pointmass.emitters import EMITTERS
 from pointmass.emitters.emitter import Emitter
-from pointmass.errors import InvalidInput, number, unknown, whole_number
-from pointmass.forces import FORCES
+from pointmass.errors import InvalidInput, number, whole_number
+from pointmass.forces import FORCES, load_grid
 from pointmass.frame import Camera
 from pointmass.laws.force import Force
+from pointmass.laws.grid import Grid
 from pointmass.look import Look
 from pointmass.particles import Particles
 from pointmass.simulation import DEFAULT_DT, Simulation
 from pointmass.solvers import SOLVERS, find_solver
 from pointmass.solvers.base import Solver
 from pointmass.system import ParticleSystem
+from pointmass.toml import dumps
 
 VERSION = 1
 LISTS: dict[str, Mapping[str, Any]] = {"bodies": BODIES, "forces": FORCES, "colliders": COLLIDERS, "emitters": EMITTERS}
+HOLDS: dict[str, type] = {"bodies": Body, "forces": Force, "colliders": Collider, "emitters": Emitter}
+PLAIN = ("name", "summary", "dt", "frames", "fps", "seed", "dtype")
 
 
 @dataclass(kw_only=True)
@@ -82,12 +85,13 @@ class Scene:
         self.seed = whole_number("seed", self.seed, at_least=0)
         if self.dtype not in ("float64", "float32"):
             raise InvalidInput(f"dtype = {self.dtype!r} is not allowed: it must be float64 or float32")
-        for what, kind in (("bodies", Body), ("forces", Force), ("colliders", Collider), ("emitters", Emitter)):
-            for item in getattr(self, what):
-                if not isinstance(item, kind):
-                    raise InvalidInput(f"{what} of a scene cannot hold {item!r}")
+        for what, kind in HOLDS.items():
+            setattr(self, what, _items(what, kind, getattr(self, what)))
         if self.solver is not None and not isinstance(self.solver, Solver):
             raise InvalidInput(f"solver must be a solver, such as pm.RK4(), not {self.solver!r}")
+        for what, settings in (("camera", Camera), ("look", Look)):
+            if not isinstance(getattr(self, what), settings):
+                raise InvalidInput(f"{what} must be a {settings.__name__}, not {getattr(self, what)!r}")
         if not self.bodies and not self.emitters:
             raise InvalidInput("a scene needs at least one body or emitter: there are no particles")
         self.names = list(self.names) or _numbered([b.kind or "particles" for b in self.bodies])
@@ -95,18 +99,28 @@ class Scene:
             raise InvalidInput(f"names has {len(self.names)} entries for {len(self.bodies)} bodies")
 
     def simulation(self) -> Simulation:
-        """A fresh simulation; every call gives the same."""
-        particles, own = join([_rebuilt(b) for b in self.bodies], self.names, np.dtype(self.dtype))
-        forces = own + [_again(f) for f in self.forces]
-        system = ParticleSystem(particles, forces, [_again(c) for c in self.colliders])
+        """A fresh simulation; every call gives the same.
+
+        Raises
+        ------
+        InvalidInput
+            Parts that do not fit together, such as a force on a group that no body has.
+        """
+        copies = [Body(b.particles, [_again(f) for f in b.forces]) for b in self.bodies]
+        particles, own = join(copies, self.names, np.dtype(self.dtype))
+        system = ParticleSystem(particles, own + [_again(f) for f in self.forces], [_again(c) for c in self.colliders])
         solver = None if self.solver is None else _again(self.solver)
         emitters = [_again(e) for e in self.emitters]
         return Simulation(system, solver, self.dt, emitters=emitters, look=self.look, seed=self.seed)
 
     # ------------------------------------------------------------------------------------------------ as text
 
-    def document(self) -> dict[str, Any]:
+    def document(self, folder: Path | None = None) -> dict[str, Any]:
         """The scene as plain tables, lists and numbers.
+
+        Parameters
+        ----------
+        folder : where the text will be: files below it are named by the way from there.
 
         Raises
         ------
@@ -116,35 +130,35 @@ class Scene:
         result: dict[str, Any] = {"version": VERSION}
         for f in fields(self):
             value = getattr(self, f.name)
-            if f.name in ("name", "summary", "dt", "frames", "fps", "seed", "dtype") and (value != f.default or f.name == "name"):
+            if f.name in PLAIN and (value != f.default or f.name == "name"):
                 result[f.name] = value
         if self.solver is not None:
-            result["solver"] = _table(SOLVERS, self.solver, self.solver.arguments, "solver")
+            result["solver"] = _table(SOLVERS, self.solver, "solver", folder)
         for what, registry in LISTS.items():
-            tables = [_table(registry, item, item.arguments, what) for item in getattr(self, what)]
+            tables = [_table(registry, item, what, folder) for item in getattr(self, what)]
             if tables:
                 result[what] = tables
         for table, name in zip(result.get("bodies", ()), self.names, strict=True):
             table["name"] = name
-        camera = {f.name: _plain(getattr(self.camera, f.name), "camera") for f in fields(Camera) if getattr(self.camera, f.name) != f.default}
-        look = {name: _plain(value, "look") for name, value in self.look.described().items()}
-        return result | {k: v for k, v in (("camera", camera), ("look", look)) if v}
+        for what, values in (("camera", _changed_from_default(self.camera)), ("look", self.look.described())):
+            if values:
+                result[what] = {name: _plain(value, f"{what}.{name}", folder) for name, value in values.items()}
+        return result
 
-    def to_toml(self) -> str:
-        """The scene as TOML; `from_toml` gives an equal one back."""
-        import tomlkit
-
-        return tomlkit.dumps(self.document())
+    def to_toml(self, folder: Path | None = None) -> str:
+        """The scene as TOML; `from_toml` gives an equal one back. See `document`."""
+        return dumps(self.document(folder))
 
     def save(self, path: str | Path) -> None:
         """Write the scene as TOML, beside and renamed."""
         path = Path(path)
+        text = self.to_toml(path.parent.resolve())
         part = path.with_name(path.name + ".part")
         try:
-            part.write_text(self.to_toml(), encoding="utf-8")
+            part.write_text(text, encoding="utf-8")
             part.replace(path)
         except OSError as error:
-            raise InvalidInput(f"cannot write {path}: {error.strerror}") from None
+            raise InvalidInput(f"cannot write {str(path)!r}: {error.strerror}") from None
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scene) and self.document() == other.document()
@@ -178,24 +192,23 @@ class Scene:
     @classmethod
     def from_document(cls, document: Mapping[str, Any], folder: Path | None = None) -> Scene:
         """A scene from plain tables, as `document` makes them."""
-        from pointmass.schema import checked
+        from pointmass.schema import checked  # pydantic, which a scene written in Python does without
 
-        d = dict(checked(document))
-        if d.pop("version", VERSION) != VERSION:
-            raise InvalidInput(f"the scene has version {document['version']}: this pointmass reads version {VERSION}")
-        bodies = [dict(b) for b in d.pop("bodies", ())]
-        named = [b.pop("name", None) for b in bodies]
-        numbered = _numbered([b["type"] for b in bodies])
-        values = {what: [_made(LISTS[what], item, what, k, folder) for k, item in enumerate(d.pop(what, ()))] for what in LISTS if what != "bodies"}
-        solver = d.pop("solver", None)
+        checked(document)
+        tables = {what: [dict(table) for table in document.get(what, ())] for what in LISTS}
+        named = [table.pop("name", None) for table in tables["bodies"]]
+        numbered = _numbered([table["type"] for table in tables["bodies"]])
+        made: dict[str, Any] = {
+            what: [_made(registry, table, f"{what}.{k}", folder) for k, table in enumerate(tables[what])]
+            for what, registry in LISTS.items()
+        }
         return cls(
-            bodies=[_made(BODIES, b, "bodies", k, folder) for k, b in enumerate(bodies)],
-            names=[n or default for n, default in zip(named, numbered, strict=True)],
-            solver=None if solver is None else _made_solver(solver),
-            camera=_settings(Camera, d.pop("camera", {})),
-            look=_settings(Look, d.pop("look", {})),
-            **values,
-            **d,
+            names=[name or default for name, default in zip(named, numbered, strict=True)],
+            solver=_made_solver(document.get("solver")),
+            camera=_settings(Camera, document.get("camera", {})),
+            look=_settings(Look, document.get("look", {})),
+            **made,
+            **{name: document[name] for name in PLAIN if name in document},
         )
 
     @classmethod
@@ -205,7 +218,8 @@ class Scene:
         try:
             text = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
-            raise InvalidInput(f"cannot read the scene {path}: {getattr(error, 'strerror', None) or error}") from None
+            reason = getattr(error, "strerror", None) or "it is not text in UTF-8"
+            raise InvalidInput(f"cannot read the scene {str(path)!r}: {reason}") from None
         return cls.from_toml(text, settings, path.parent)
 
     def changed(self, **values: Any) -> Scene:
@@ -222,13 +236,26 @@ def body_of(particles: Particles, forces: Sequence[Force] = ()) -> Body:
     return Body(p, list(forces), "points", arguments)
 
 
+# ------------------------------------------------------------------------------------------------------------ objects
+
+
+def _items(what: str, kind: type, value: Any) -> list[Any]:
+    try:
+        items = list(value)
+    except TypeError:
+        raise InvalidInput(f"{what} of a scene must be a list, not {value!r}") from None
+    for item in items:
+        if not isinstance(item, kind):
+            raise InvalidInput(f"{what} of a scene cannot hold {item!r}")
+    return items
+
+
 def _again(item: Any) -> Any:
-    return type(item)(**item.arguments)
-
-
-def _rebuilt(body: Body) -> Body:
-    fresh = BODIES[body.kind](**body.arguments) if body.kind in BODIES else body
-    return Body(fresh.particles, fresh.forces if body.kind != "points" else [_again(f) for f in body.forces])
+    """An equal object without a history."""
+    fresh = type(item)(**item.arguments)
+    if isinstance(item, Force):
+        fresh.enabled = item.enabled
+    return fresh
 
 
 def _numbered(kinds: Sequence[str]) -> list[str]:
@@ -240,59 +267,126 @@ def _numbered(kinds: Sequence[str]) -> list[str]:
     return result
 
 
-def _table(registry: Mapping[str, Any], item: Any, arguments: Mapping[str, Any], what: str) -> dict[str, Any]:
+def _changed_from_default(camera: Camera) -> dict[str, Any]:
+    values = {f.name: getattr(camera, f.name) for f in fields(camera)}
+    return {f.name: values[f.name] for f in fields(camera) if values[f.name] != f.default}
+
+
+# ------------------------------------------------------------------------------------------------------- into tables
+
+
+def _table(registry: Mapping[str, Any], item: Any, what: str, folder: Path | None) -> dict[str, Any]:
+    """How an object was made."""
     kind = item.kind if isinstance(item, Body) else next((k for k, c in registry.items() if type(item) is c), None)
     if kind not in registry:
-        raise InvalidInput(f"{type(item).__name__} was written in Python and has no text: in a scene file, write a law as a field")
-    if isinstance(item, Body) and kind == "points" and item.forces:
+        raise InvalidInput(
+            f"{_name(item)} was written in Python and has no text: in a scene file, write a law as a field"
+        )
+    if isinstance(item, Body):
+        _check_as_built(item)
+    arguments = dict(item.arguments)
+    if isinstance(item, Force) and not item.enabled:
+        arguments["enabled"] = False
+    return {"type": kind} | {n: _plain(v, f"{what} {kind}.{n}", folder) for n, v in arguments.items() if v is not None}
+
+
+def _check_as_built(body: Body) -> None:
+    """A body that was changed after it was built is not what its arguments say."""
+    if body.kind == "points" and body.forces:
         raise InvalidInput("a body of points with forces of its own has no text: give the forces to the scene")
-    return {"type": kind} | {name: _plain(value, f"{what} {kind}.{name}") for name, value in arguments.items()}
+    built = BODIES[body.kind](**body.arguments)
+    p, q = built.particles, body.particles
+    same = p.attributes.keys() == q.attributes.keys() and p.groups.keys() == q.groups.keys()
+    pairs = [(p.x, q.x), (p.v, q.v), (p.m, q.m), (p.radius, q.radius), (p.pinned, q.pinned)]
+    pairs += [(p.attributes[a], q.attributes[a]) for a in p.attributes if same]
+    pairs += [(p.groups[g], q.groups[g]) for g in p.groups if same]
+    forces = [(type(f), f.enabled) for f in built.forces] == [(type(f), f.enabled) for f in body.forces]
+    if not (same and forces and all(np.array_equal(a, b) for a, b in pairs)):
+        raise InvalidInput(
+            f"the body {body.kind!r} was changed after it was built and has no text: give its forces to the scene, "
+            "and its particles as pm.body_of(particles)"
+        )
 
 
-def _plain(value: Any, where: str) -> Any:
+def _name(item: Any) -> str:
+    return (item.kind if isinstance(item, Body) else type(item).__name__) or "a body made by hand"
+
+
+def _plain(value: Any, where: str, folder: Path | None) -> Any:
     """Numbers, strings, lists and tables only."""
+    if isinstance(value, Grid):
+        return _plain_grid(value, where, folder)
     if isinstance(value, Described):
-        return _table(FORCES, value, value.arguments, where)
+        return _table(FORCES, value, where, folder)
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     if isinstance(value, Mapping):
-        return {str(k): _plain(v, where) for k, v in value.items() if v is not None}
-    if isinstance(value, (list, tuple, set)):
-        return [_plain(v, where) for v in value]
-    if isinstance(value, Path):
-        return str(value)
+        return {str(k): _plain(v, where, folder) for k, v in value.items() if v is not None}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v, where, folder) for v in value]
+    if isinstance(value, Path) or (isinstance(value, str) and where.endswith(".grid")):
+        return _way(value, folder)
     if isinstance(value, (str, bool, int, float)):
         return value
-    if getattr(value, "path", None) is not None:
-        return str(value.path)
     raise InvalidInput(f"{where} = {value!r} was written in Python and has no text: use a number or a formula")
 
 
-def _made(registry: Mapping[str, Any], table: Mapping[str, Any], what: str, k: int, folder: Path | None) -> Any:
+def _plain_grid(grid: Grid, where: str, folder: Path | None) -> Any:
+    if grid.path is None:
+        raise InvalidInput(f"{where} holds a grid without a file and has no text: save it and use pm.load_grid")
+    path = _way(grid.path, folder)
+    if grid.outside == "zero" and grid.variables is None:
+        return path
+    variables = {} if grid.variables is None else {"variables": list(grid.variables)}
+    return {"path": path, **variables, "outside": grid.outside}
+
+
+def _way(path: str | Path, folder: Path | None) -> str:
+    """The path of a file as seen from a folder, if it is below it."""
+    if folder is None:
+        return str(path)
+    whole = Path(path).resolve()
+    return str(whole.relative_to(folder) if whole.is_relative_to(folder) else whole)
+
+
+# ------------------------------------------------------------------------------------------------------- from tables
+
+
+def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, folder: Path | None) -> Any:
+    """The object that a table describes; paths start at `folder`."""
     values = dict(table)
     kind = values.pop("type")
-    for name, value in values.items():
-        if isinstance(value, Mapping) and "type" in value:
-            values[name] = _made(FORCES, value, f"{what}.{k}.{name}", 0, folder)
-        if name == "grid" and folder is not None and isinstance(value, str):
-            values[name] = str(folder / value)
     try:
+        if isinstance(values.get("velocity"), Mapping):
+            values["velocity"] = _made(FORCES, values["velocity"], f"{where}.velocity", folder)
+        if "grid" in values:
+            values["grid"] = _grid(values["grid"], folder)
         return registry[kind](**values)
     except InvalidInput as error:
-        raise InvalidInput(f"{what}.{k} ({kind}): {error}") from None
+        raise InvalidInput(f"{where} ({kind}): {error}") from None
 
 
-def _made_solver(table: Any) -> Solver:
-    values = {"type": table} if isinstance(table, str) else dict(table)
+def _grid(value: Any, folder: Path | None) -> Any:
+    settings = dict(value) if isinstance(value, Mapping) else {"path": value}
+    path = str(settings.pop("path"))
+    # Found again from wherever this scene, or a cache that keeps its text, is read.
+    path = path if folder is None else str((folder / path).resolve())
+    return load_grid(path, **settings) if settings else path
+
+
+def _made_solver(value: Any) -> Solver | None:
+    if value is None:
+        return None
+    values = {"type": value} if isinstance(value, str) else dict(value)
     return find_solver(values.pop("type"))(**values)
 
 
 def _settings(kind: Any, table: Mapping[str, Any]) -> Any:
-    known = {f.name for f in fields(kind)}
-    for name in table:
-        if name not in known:
-            raise unknown(f"key in {kind.__name__.lower()}:", name, known)
-    return kind(**{k: tuple(v) if isinstance(v, list) else v for k, v in table.items()})
+    return kind(**{name: _tuples(value) for name, value in table.items()})
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
 
 
 def _set(document: dict[str, Any], path: str, value: Any) -> None:
@@ -300,23 +394,24 @@ def _set(document: dict[str, Any], path: str, value: Any) -> None:
     *way, last = path.split(".")
     here: Any = document
     for part in way:
-        here = _inside(here, part, path) if isinstance(here, list) or part in here else here.setdefault(part, {})
+        if isinstance(here, dict) and part not in here:
+            here[part] = {}
+        here = _inside(here, part, path)
     if isinstance(here, list):
         _inside(here, last, path)
         here[int(last)] = value
     elif isinstance(here, dict):
         here[last] = value
     else:
-        raise InvalidInput(f"the scene has no {path!r}: use a path such as forces.0.k")
+        raise _no_path(path)
 
 
 def _inside(here: Any, part: str, path: str) -> Any:
     try:
         return here[int(part)] if isinstance(here, list) else here[part]
     except (ValueError, IndexError, KeyError, TypeError):
-        raise InvalidInput(f"the scene has no {path!r}: use a path such as forces.0.k") from None
+        raise _no_path(path) from None
 
 
-def finite(value: float) -> float | None:
-    """A number for JSON: None where there is none (infinity, NaN)."""
-    return value if math.isfinite(value) else None
+def _no_path(path: str) -> InvalidInput:
+    return InvalidInput(f"the scene has no {path!r}: use a path such as forces.0.k or look.color")

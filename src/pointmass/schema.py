@@ -1,78 +1,136 @@
 """The form of scene files, made from the constructors of everything that can stand in one.
 
-A new force, solver, collider, emitter or body is in the schema as soon as it is in its registry.
+A new force, solver, collider, emitter or body is in the schema as soon as it is in its registry. `python -m
+pointmass.schema` prints it, for editors that complete and check TOML.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import ast
+import inspect
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from functools import cache
 from inspect import Parameter
-from typing import Annotated, Any, Literal, Union
+from typing import Annotated, Any, ClassVar, Literal, Union
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
-from pointmass.bodies.body import BODIES
+from pointmass.bodies import BODIES
 from pointmass.collisions import COLLIDERS
 from pointmass.description import parameters_of
 from pointmass.emitters import EMITTERS
 from pointmass.errors import InvalidInput, unknown
 from pointmass.forces import FORCES
 from pointmass.frame import Camera
+from pointmass.laws.unary import VelocityField
 from pointmass.look import Look
-from pointmass.solvers import ALIASES, SOLVERS
+from pointmass.simulation import DEFAULT_DT
+from pointmass.solvers import ALIASES, SOLVERS, find_solver
 
-Number = float | int
-REGISTRIES: dict[str, Mapping[str, Any]] = {
-    "bodies": BODIES,
-    "forces": FORCES,
-    "colliders": COLLIDERS,
-    "emitters": EMITTERS,
+VERSION = 1
+LISTS: dict[str, Mapping[str, Any]] = {"bodies": BODIES, "forces": FORCES, "colliders": COLLIDERS, "emitters": EMITTERS}
+DTYPES = ("float64", "float32")
+
+
+class Table(BaseModel):
+    """A table of a scene file; `allowed` says in words what each value may be."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+    allowed: ClassVar[dict[str, str]] = {}
+
+
+class GridTable(Table):
+    """A grid file, read in another way than by default."""
+
+    path: str
+    variables: list[str] | None = None
+    outside: Literal["zero", "clamp", "wrap"] = "zero"
+    allowed: ClassVar[dict[str, str]] = {
+        "path": "text",
+        "variables": "a list of names",
+        "outside": "'zero', 'clamp' or 'wrap'",
+    }
+
+
+def _exactly(count: int, kind: Any) -> Any:
+    return Annotated[list[kind], Field(min_length=count, max_length=count)]
+
+
+Row = list[float | str]
+BOX = "tuple[tuple[float, float, float], tuple[float, float, float]]"
+SCALAR = (float | str | list[float], "a number, a formula in quotes, or a list of numbers")
+VECTOR = (Row | list[list[float]], "three numbers or formulas, such as [0, -9.81, 0]")
+FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's parameter, without "| None"
+    "Any": (float | str | list[float | str | Row], "a number, or a list of numbers or formulas"),
+    "ArrayLike": (list[list[int]], "a list of lists of particle ids, such as [[0, 1], [1, 2]]"),
+    "Grid | str": (str | GridTable, "the path of a file, or a table with its path"),
+    "Scalar": SCALAR,
+    "Selection": (str | list[int] | list[bool], "the name of a body or group, or a list of rows"),
+    "Vector": VECTOR,
+    BOX: (_exactly(2, _exactly(3, float)), "two corners, such as [[0, 0, 0], [1, 1, 1]]"),
+    "bool": (bool, "true or false"),
+    "dict[str, Any]": (dict[str, float | list[float]], "a table of numbers, or of lists of numbers"),
+    "dict[str, Scalar]": (dict[str, float | str | list[float]], "a table of numbers or formulas"),
+    "float": (float, "a number"),
+    "int": (int, "a whole number"),
+    "str": (str, "text in quotes"),
 }
-FORMS: dict[str, Any] = {  # by the annotation of a constructor's parameter, as written there
-    "float": Number,
-    "int": int,
-    "bool": bool,
-    "str": str,
-    "str | None": str,
-    "Scalar": Number | str | list[Number],
-    "Scalar | None": Number | str | list[Number],
-    "Vector": list[Number | str] | list[list[Number]],
-    "Contact": Literal["swept", "discrete"],
-    "Selection": str | list[int] | list[bool],
-    "dict[str, float] | None": dict[str, Number],
-}
+UNKNOWN = (Any, "another value")
+FLOW_OR_VECTOR = "Vector | VelocityField"
+SHORT = {"Contact": "Literal['swept', 'discrete']"}
 
 
 @cache
-def model() -> type[BaseModel]:
+def model() -> type[Table]:
     """The pydantic model of a scene file."""
     lists: dict[str, Any] = {
-        what: (list[_one_of(what, registry)], Field(default=[])) for what, registry in REGISTRIES.items()
+        what: (list[_one_of(what, tuple(registry))], Field(default=[], description=_LIST_DOCS[what]))  # type: ignore[misc]
+        for what, registry in LISTS.items()
     }
-    solver = Union[Literal[tuple([*SOLVERS, *ALIASES])], _one_of("solver", SOLVERS)]  # type: ignore[valid-type]  # noqa: UP007
-    return create_model(
+    names: Any = Literal[(*SOLVERS, *ALIASES)]
+    solver: Any = Union[names, _one_of("solver", tuple(SOLVERS))]  # noqa: UP007
+    dtype: Any = Literal[DTYPES]
+    result = create_model(
         "Scene",
-        __config__=ConfigDict(extra="forbid", title="pointmass scene"),
-        version=(Literal[1], 1),
-        name=(str, "scene"),
-        summary=(str, ""),
-        dt=(Number, 1 / 240),
-        frames=(int, 240),
-        fps=(Number, 60),
-        seed=(int, 0),
-        dtype=(Literal["float64", "float32"], "float64"),
-        solver=(solver, "symplectic_euler"),
-        camera=(_table("camera", Camera), {}),
-        look=(_table("look", Look), {}),
+        __base__=Table,
+        version=(Literal[1], Field(default=VERSION, description="of the form of scene files")),
+        name=(str, Field(default="scene", description="short, for people and file names")),
+        summary=(str, Field(default="", description="one line about what one sees")),
+        dt=(float, Field(default=DEFAULT_DT, gt=0, description="the solver's step [s]")),
+        frames=(int, Field(default=240, ge=1, description="length of the run")),
+        fps=(float, Field(default=60.0, gt=0, description="frames for a second of simulated time")),
+        seed=(int, Field(default=0, ge=0, description="of all chance while it runs")),
+        dtype=(dtype, Field(default=DTYPES[0], description="precision of the numbers")),
+        solver=(solver, Field(default=None, description="symplectic_euler by default, rk4 for a flow")),
+        camera=(settings_model("camera"), Field(default={}, description="what a picture shows")),
+        look=(settings_model("look"), Field(default={}, description="how it looks")),
         **lists,
     )
+    result.allowed = {
+        "name": "text in quotes",
+        "summary": "text in quotes",
+        "dt": "a number greater than 0 [s]",
+        "frames": "a whole number, at least 1",
+        "fps": "a number greater than 0 [1/s]",
+        "seed": "a whole number, at least 0",
+        "dtype": "'float64' or 'float32'",
+    }
+    return result
 
 
 def json_schema() -> dict[str, Any]:
     """The form of scene files as a JSON schema."""
-    return model().model_json_schema()
+    schema = model().model_json_schema()
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **schema,
+        "title": "pointmass scene",
+        "description": "A scene file of pointmass. Units are SI.",
+    }
 
 
 def checked(document: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -83,61 +141,194 @@ def checked(document: Mapping[str, Any]) -> Mapping[str, Any]:
     InvalidInput
         One sentence about the first thing that is wrong.
     """
-    _check_kinds(document)
-    try:
-        model().model_validate(document, strict=False)
-    except ValidationError as error:
-        raise InvalidInput(_sentence(error)) from None
+    if document.get("version", VERSION) != VERSION:
+        raise InvalidInput(f"the scene has version {document['version']!r}: this pointmass reads version {VERSION}")
+    plain = {k: v for k, v in document.items() if k not in (*LISTS, "solver", "camera", "look")}
+    _check_table("the scene", model(), plain, "")
+    for what, registry in LISTS.items():
+        for k, table in enumerate(_list(what, document.get(what, []))):
+            _check_entry(f"{what}.{k}", what, table, registry)
+    _check_solver(document.get("solver"))
+    for what in ("camera", "look"):
+        _check_table(what, settings_model(what), document.get(what, {}), f"{what}.")
+    _check_numbers(document)
     return document
 
 
-def _one_of(what: str, registry: Mapping[str, Any]) -> Any:
-    kinds = tuple(_model(what, kind, factory) for kind, factory in registry.items())
-    return Annotated[Union[kinds], Field(discriminator="type")] if len(kinds) > 1 else kinds[0]  # type: ignore[valid-type]  # noqa: UP007
+@cache
+def settings_model(what: str) -> type[Table]:
+    """The model of the camera or the look."""
+    kind = {"camera": Camera, "look": Look}[what]
+    docs = documented(kind)
+    entries = {f.name: (str(f.type), docs.get(f.name, ""), f.default) for f in fields(kind)}
+    return _created(what, entries, {})
 
 
-def _model(what: str, kind: str, factory: Any) -> type[BaseModel]:
-    entries: dict[str, Any] = {"type": (Literal[kind], ...)}
-    for name, parameter in parameters_of(factory).items():
-        form = FORMS.get(str(parameter.annotation), Any)
-        entries[name] = (form, ... if parameter.default is Parameter.empty else None)
+@cache
+def entry_model(what: str, kind: str) -> type[Table]:
+    """The model of one kind of body, force, collider, emitter or solver."""
+    factory = {**LISTS, "solver": SOLVERS}[what][kind]
+    docs = documented(factory)
+    entries = {n: (str(p.annotation), docs.get(n, ""), p.default) for n, p in parameters_of(factory).items()}
+    own: dict[str, Any] = {"type": (Literal[kind], ...)}
     if what == "bodies":
-        entries["name"] = (str, None)
-    summary = (factory.__doc__ or "").strip().splitlines()
-    config = ConfigDict(extra="forbid", title=kind, json_schema_extra={"description": summary[0] if summary else kind})
-    return create_model(f"{what}_{kind}", __config__=config, **entries)
+        own["name"] = (str, Field(default="", description="forces and reports call it by this name"))
+    result = _created(f"{what}_{kind}", entries, own)
+    result.__doc__ = (inspect.getdoc(factory) or kind).splitlines()[0]
+    return result
 
 
-def _table(name: str, kind: Any) -> type[BaseModel]:
-    forms = {f.name: (Any, None) for f in fields(kind)}
-    return create_model(name, __config__=ConfigDict(extra="forbid"), **forms)  # type: ignore[call-overload,no-any-return]
+def form_of(annotation: str) -> tuple[Any, str]:
+    """What may stand in a file for a parameter with this annotation: a type for pydantic, and words."""
+    annotation = SHORT.get(annotation, annotation).removesuffix(" | None")
+    if annotation.startswith("Literal["):
+        choices = ast.literal_eval(annotation.removeprefix("Literal"))
+        return Literal[tuple(choices)], _listed(choices)
+    if annotation.startswith("tuple[float"):
+        count = annotation.count("float")
+        return _exactly(count, float), f"a list of {count} numbers"
+    if annotation == FLOW_OR_VECTOR:
+        kind, words = VECTOR
+        return Union[kind, _flows()], f"{words}, or a table with the type of a flow"  # noqa: UP007
+    return FORMS.get(annotation, UNKNOWN)
 
 
-def _check_kinds(document: Mapping[str, Any]) -> None:
-    """Name what is unknown before pydantic lists every kind there is."""
-    for key in document:
-        if key not in model().model_fields:
-            raise unknown("key in the scene:", key, model().model_fields)
-    for what, registry in REGISTRIES.items():
-        for k, table in enumerate(document.get(what) or ()):
-            if not isinstance(table, Mapping) or "type" not in table:
-                raise InvalidInput(f"{what}.{k} needs a type: one of {', '.join(registry)}")
-            if table["type"] not in registry:
-                raise unknown(f"type in {what}.{k}:", table["type"], registry)
-            known = {*parameters_of(registry[table["type"]]), "type", *(["name"] if what == "bodies" else [])}
-            for key in table:
-                if key not in known:
-                    raise unknown(f"key in {what}.{k} ({table['type']}):", key, known)
-    solver = document.get("solver", "euler")
-    kind = solver.get("type") if isinstance(solver, Mapping) else solver
-    if kind not in SOLVERS and kind not in ALIASES:
-        raise unknown("solver", kind, [*SOLVERS, *ALIASES])
+def documented(factory: Any) -> dict[str, str]:
+    """What the docstring of a class or function says about each of its parameters, one sentence each."""
+    result: dict[str, str] = {}
+    names: list[str] = []
+    for line in (inspect.getdoc(factory) or "").splitlines():
+        entry = re.fullmatch(r"(\w+(?:, \w+)*) : (.+)", line)
+        if entry:
+            names = entry[1].split(", ")
+            result |= dict.fromkeys(names, entry[2])
+        elif line.startswith("    ") and names:
+            result |= {name: f"{result[name]} {line.strip()}" for name in names}
+        else:
+            names = []
+    return result
 
 
-def _sentence(error: ValidationError) -> str:
-    first = error.errors()[0]
-    path = ".".join(str(part) for part in first["loc"] if not str(part).startswith(("list[", "function", "float", "int", "str")))
-    value = repr(first.get("input"))
-    shown = value if len(value) <= 60 else value[:57] + "..."
-    text = first["msg"][0].lower() + first["msg"][1:]
-    return f"{path or 'the scene'}: {text}, not {shown}"
+# ---------------------------------------------------------------------------------------------------- making models
+
+_LIST_DOCS = {
+    "bodies": "what there is at the start",
+    "forces": "that act on the particles, after the bodies' own",
+    "colliders": "surfaces that particles bounce off",
+    "emitters": "where particles come from",
+}
+
+
+def _created(name: str, entries: Mapping[str, tuple[str, str, Any]], own: dict[str, Any]) -> type[Table]:
+    made = dict(own)
+    allowed = {"name": "text in quotes"} if "name" in own else {}
+    for key, (annotation, doc, default) in entries.items():
+        form, allowed[key] = form_of(annotation)
+        required = default is Parameter.empty
+        made[key] = (form, Field(default=... if required else _plain_default(default), description=doc or None))
+    result = create_model(name, __base__=Table, **made)
+    result.allowed = allowed
+    return result
+
+
+def _plain_default(value: Any) -> Any:
+    """A default as JSON can hold it; None stands for everything else, and for "not given"."""
+    if isinstance(value, (tuple, list)):
+        return list(value)
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _one_of(what: str, kinds: Sequence[str]) -> Any:
+    models = tuple(entry_model(what, kind) for kind in kinds)
+    return Annotated[Union[models], Field(discriminator="type")] if len(models) > 1 else models[0]  # noqa: UP007
+
+
+def _flows() -> Any:
+    return _one_of("forces", tuple(_flow_kinds()))
+
+
+def _flow_kinds() -> dict[str, Any]:
+    return {name: kind for name, kind in FORCES.items() if issubclass(kind, VelocityField)}
+
+
+# ------------------------------------------------------------------------------------------------ checking, in words
+
+
+def _list(what: str, value: Any) -> Sequence[Any]:
+    if not isinstance(value, list):
+        raise InvalidInput(f"{what} must be a list of tables: begin each with [[{what}]], not with [{what}]")
+    return value
+
+
+def _check_entry(where: str, what: str, table: Any, registry: Mapping[str, Any]) -> None:
+    """A table whose `type` says what it is."""
+    if not isinstance(table, Mapping):
+        raise InvalidInput(f"{where} must be a table with a type, not {shown(table)}")
+    kind = table.get("type")
+    if kind is None:
+        raise InvalidInput(f"{where} needs a type: one of {', '.join(registry)}")
+    if not isinstance(kind, str) or kind not in registry:
+        raise unknown(f"type in {where}:", kind, registry)
+    nested = table.get("velocity")
+    if what == "forces" and isinstance(nested, Mapping):
+        _check_entry(f"{where}.velocity", "forces", nested, _flow_kinds())
+    grid = table.get("grid")
+    if isinstance(grid, Mapping):
+        _check_table(f"{where}.grid", GridTable, grid, f"{where}.grid.")
+    _check_table(f"{where} ({kind})", entry_model(what, kind), table, f"{where}.")
+
+
+def _check_solver(value: Any) -> None:
+    if value is None:
+        return
+    kind = value.get("type") if isinstance(value, Mapping) else value
+    if not isinstance(kind, str):
+        raise InvalidInput(f"solver must be a name such as 'rk4', or a table with a type, not {shown(value)}")
+    if isinstance(value, Mapping):
+        name = find_solver(kind).name
+        _check_table(f"solver ({name})", entry_model("solver", name), {**value, "type": name}, "solver.")
+    else:
+        find_solver(kind)
+
+
+def _check_table(where: str, form: type[Table], table: Any, prefix: str) -> None:
+    """A table whose keys are known and whose values are of the right kinds."""
+    if not isinstance(table, Mapping):
+        raise InvalidInput(f"{where} must be a table, not {shown(table)}")
+    for key in table:
+        if key not in form.model_fields:
+            raise unknown(f"key in {where}:", key, form.model_fields)
+    try:
+        form.model_validate(table)
+    except ValidationError as error:
+        first = error.errors()[0]
+    else:
+        return
+    name = str(first["loc"][0])
+    if first["type"] == "missing" and len(first["loc"]) == 1:
+        raise InvalidInput(f"{where} needs {name!r}: {form.allowed[name]}")
+    raise InvalidInput(f"{prefix}{name} = {shown(table[name])} is not allowed: it must be {form.allowed[name]}")
+
+
+def _check_numbers(value: Any, path: str = "") -> None:
+    """Refuse NaN everywhere, and infinity where nothing lasts for ever."""
+    if isinstance(value, float) and (math.isnan(value) or (math.isinf(value) and not path.startswith("emitters."))):
+        raise InvalidInput(f"{path} = {value} is not allowed: it must be a finite number")
+    items = value.items() if isinstance(value, Mapping) else enumerate(value) if isinstance(value, list) else ()
+    for key, item in items:
+        _check_numbers(item, f"{path}.{key}" if path else str(key))
+
+
+def shown(value: Any) -> str:
+    """A value for a message, cut off where it is long, in one line."""
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _listed(choices: Sequence[Any]) -> str:
+    *most, last = [repr(c) for c in choices]
+    return f"{', '.join(most)} or {last}" if most else last
+
+
+if __name__ == "__main__":
+    print(json.dumps(json_schema(), indent=1))
