@@ -23,6 +23,7 @@ PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 LARGEST = 150_000  # bytes of a picture
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)|<img[^>]+src=\"([^\"]+)\"")
+FILE = re.compile(r"# ([\w-]+\.toml)\n")
 every_page = pytest.mark.parametrize("page", PAGES, ids=lambda p: p.stem)
 
 
@@ -58,7 +59,7 @@ def test_programs_run_and_print_what_they_say(page: Path, tmp_path: Path) -> Non
     if not (source := program(page)).strip():
         return
     for _, block in blocks(page, "toml"):
-        if name := re.match(r"# ([\w-]+\.toml)\n", block):
+        if name := FILE.match(block):
             (tmp_path / name[1]).write_text(block, encoding="utf-8")
     script = tmp_path / page.name
     script.write_text(source, encoding="utf-8")
@@ -88,6 +89,8 @@ def test_scene_files_load(page: Path) -> None:
     for _, block in blocks(page, "toml"):
         if block.startswith("# fragment"):
             tomllib.loads(block)
+        elif name := FILE.match(block):
+            assert f'Scene.load("{name[1]}"' in program(page), f"{page.name} has {name[1]} and does not load it"
         else:
             pm.Scene.from_toml(block).simulation()
 
