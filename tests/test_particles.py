@@ -175,3 +175,24 @@ def test_every_change_of_structure_is_counted():
         change()
         assert p.version not in seen
         seen.add(p.version)
+
+
+def test_no_particles_at_all() -> None:
+    assert len(Particles([])) == 0
+
+
+def test_a_number_too_large_for_float32_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="x has a number that is too large for float32"):
+        Particles([[1e300, 0, 0]], dtype=np.float32)
+
+
+def test_ids_of_emitters_leave_no_mark_on_the_count() -> None:
+    particles = Particles([[0, 0, 0]])
+    particles.add([[1, 0, 0]], id=[2**62])
+    assert particles.add([[2, 0, 0]]).tolist() == [1]
+
+
+@pytest.mark.parametrize("name", ["e", "pi", "vx", "t", "f", "two words"])
+def test_names_that_formulas_need_are_no_attributes(name: str) -> None:
+    with pytest.raises(InvalidInput, match="particle attribute"):
+        Particles([[0, 0, 0]], **{name: 1.0})

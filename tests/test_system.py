@@ -210,3 +210,11 @@ def test_a_numpy_force_in_a_system():
 
     floating = ParticleSystem(Particles(X, V, M), [Gravity(), lift])
     np.testing.assert_allclose(floating.deriv_eval()[18:], 0, atol=1e-12)
+
+
+def test_a_refused_birth_leaves_the_system_as_it_was() -> None:
+    system = ParticleSystem(Particles([[0, 0, 0], [1, 0, 0]]), [Gravity(), Drag(k=np.array([1.0, 2.0]))])
+    with pytest.raises(InvalidInput, match="2 values for 3 particles"):
+        system.add([[2, 0, 0]])
+    assert len(system.particles) == 2
+    assert system.deriv_eval(0.0, system.get_state()).shape == (12,)

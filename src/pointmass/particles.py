@@ -11,6 +11,8 @@ from pointmass.errors import InvalidInput, finite_array, unknown
 
 Array = NDArray[np.floating[Any]]
 Selection = str | ArrayLike | None  # a group's name, a mask, rows; None = all
+FIRST_FOREIGN_ID = 2**40  # ids from here on are made by emitters, and leave no mark on the count
+NOT_ATTRIBUTES = ("t", "y", "z", "vx", "vy", "vz", "e", "pi")  # these mean something else in formulas
 FIELDS = ("x", "v", "f", "m", "w", "age", "radius", "id")
 
 
@@ -120,10 +122,12 @@ class Particles:
             "radius": radius,
             "age": np.zeros(n),
         }
+        new, columns = ({name: self._cast(name, part) for name, part in d.items()} for d in (new, columns))
+        self._next_id = max(self._next_id, int(ids[ids < FIRST_FOREIGN_ID].max(initial=-1)) + 1)
         for name, values in new.items():
-            setattr(self, name, np.concatenate([getattr(self, name), values]).astype(self.dtype))
+            setattr(self, name, np.concatenate([getattr(self, name), values]))
         for name, values in columns.items():
-            self.attributes[name] = np.concatenate([self.attributes[name], values]).astype(self.dtype)
+            self.attributes[name] = np.concatenate([self.attributes[name], values])
         for name, mask in self.groups.items():
             self.groups[name] = np.concatenate([mask, np.zeros(n, bool)])
         self.id = np.concatenate([self.id, ids])
@@ -223,19 +227,26 @@ class Particles:
         result = np.asarray(ids, np.int64)
         if result.shape != (n,) or len(np.unique(result)) != n or np.isin(result, self.id).any():
             raise InvalidInput(f"id must be {n} numbers that no other particle has")
-        self._next_id = max(self._next_id, int(result.max(initial=-1)) + 1)
+        return result
+
+    def _cast(self, name: str, values: Array) -> Array:
+        with np.errstate(over="ignore"):
+            result = values.astype(self.dtype)
+        if not np.isfinite(result).all():
+            raise InvalidInput(f"{name} has a number that is too large for {self.dtype}")
         return result
 
 
 def _attribute_name(name: str) -> str:
-    if not name.isidentifier() or name in (*FIELDS, "t", "y", "z"):
-        raise InvalidInput(
-            f"particle attribute {name!r} is not allowed: use a word that is not {', '.join(FIELDS)}, t, y or z"
-        )
+    taken = (*FIELDS, *NOT_ATTRIBUTES)
+    if not name.isidentifier() or name in taken:
+        raise InvalidInput(f"particle attribute {name!r} is not allowed: use a word that is not {', '.join(taken)}")
     return name
 
 
 def _points(name: str, value: ArrayLike, n: int | None = None) -> Array:
+    if np.size(np.asarray(value, dtype=object)) == 0:
+        return finite_array(name, np.zeros((0, 3)), (n, 3))
     array = np.atleast_2d(np.asarray(value, dtype=object if _ragged(value) else None))
     if array.ndim == 2 and array.shape[1] == 2 and array.dtype != object:
         array = np.column_stack([array, np.zeros(len(array))])

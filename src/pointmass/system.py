@@ -239,9 +239,17 @@ class ParticleSystem:
 
     def add(self, x: Any, v: Any = None, **columns: Any) -> NDArray[np.int64]:
         """Add particles (see `Particles.add`); every force without a selection acts on them too. Returns their ids."""
+        before = len(self.particles)
         ids = self.particles.add(x, v, **columns)
-        for force in self.forces:
-            force.grow(self.particles, len(ids))
+        for k, force in enumerate(self.forces):
+            try:
+                force.grow(self.particles, len(ids))
+            except InvalidInput:
+                old = np.arange(len(self.particles)) < before
+                for grown in self.forces[:k]:
+                    grown.keep(self.particles, old)
+                self.particles.keep(old)
+                raise
         return ids
 
     def remove(self, which: Selection) -> None:
