@@ -12,6 +12,8 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pointmass.laws import functions as fn  # the same bits on every machine, unlike np.cos
+
 Array = NDArray[np.float64]
 MULTIPLY = (np.uint64(0xD2511F53), np.uint64(0xCD9E8D57))
 WEYL = (np.uint64(0x9E3779B9), np.uint64(0xBB67AE85))
@@ -56,8 +58,8 @@ def spread(seed: int, stream: str, ids: ArrayLike, purpose: str, mean: float, ha
 def normal(seed: int, stream: str, ids: ArrayLike, purpose: str) -> Array:
     """Two independent standard normal numbers for each id, shape (*ids.shape, 2) (Box & Muller 1958)."""
     u = uniform(seed, stream, ids, purpose)
-    r, angle = np.sqrt(-2.0 * np.log1p(-u[..., 0])), 2.0 * np.pi * u[..., 1]
-    return np.stack([r * np.cos(angle), r * np.sin(angle)], axis=-1)
+    r, angle = np.sqrt(-2.0 * fn.log(1.0 - u[..., 0])), 2.0 * np.pi * u[..., 1]
+    return np.stack([r * fn.cos(angle), r * fn.sin(angle)], axis=-1)
 
 
 def direction(seed: int, stream: str, ids: ArrayLike, purpose: str) -> Array:
@@ -65,4 +67,4 @@ def direction(seed: int, stream: str, ids: ArrayLike, purpose: str) -> Array:
     u = uniform(seed, stream, ids, purpose)
     height, angle = 2.0 * u[..., 0] - 1.0, 2.0 * np.pi * u[..., 1]
     radius = np.sqrt(1.0 - height * height)
-    return np.stack([radius * np.cos(angle), height, radius * np.sin(angle)], axis=-1)
+    return np.stack([radius * fn.cos(angle), height, radius * fn.sin(angle)], axis=-1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import product
 from typing import Any
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from pointmass.bodies.body import Body, body
 from pointmass.errors import InvalidInput, finite_array, number
 from pointmass.forces.springs import Springs
+from pointmass.laws import functions as fn
 from pointmass.particles import Particles
 
 FAMILIES = {"stretch": 1, "shear": 2, "bend": 3}  # lattice steps between the ends: along an edge, a face, the body
@@ -50,7 +52,7 @@ def lattice(
     if (edges <= 0).any():
         raise InvalidInput(f"size = {size} is not allowed: each side must be greater than 0 [m]")
     x = (grid - (np.array(shape) - 1) / 2) * edges
-    place = finite_array("center", center, (3,)) + x @ _turn(number("tilt", tilt, unit="degrees")).T
+    place = finite_array("center", center, (3,)) + _turned(x, number("tilt", tilt, unit="degrees"))
     m = number("mass", mass, above=0, unit="kg") / len(x)
     v = np.tile(finite_array("velocity", velocity, (3,)), (len(x), 1))
     k = number("k_s", k_s, above=0, unit="N/m")
@@ -77,10 +79,8 @@ def _neighbours(grid: NDArray[np.integer[Any]], shape: NDArray[np.integer[Any]],
     return np.concatenate(result)
 
 
-def _turn(degrees: float) -> NDArray[np.float64]:
-    """Rotation about z, then about x."""
-    a = np.radians(degrees)
-    c, s = np.cos(a), np.sin(a)
-    about_z = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    about_x = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
-    return np.asarray(about_x @ about_z)
+def _turned(x: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
+    """Points turned about z, then about x; no matrix product, whose rounding depends on the machine."""
+    c, s = fn.cos(math.radians(degrees)), fn.sin(math.radians(degrees))
+    a, b = c * x[:, 0] - s * x[:, 1], s * x[:, 0] + c * x[:, 1]
+    return np.stack([a, c * b - s * x[:, 2], s * b + c * x[:, 2]], axis=1)

@@ -11,6 +11,7 @@ import numpy as np
 from pointmass.bodies import points
 from pointmass.forces import Attractor, Gravitation
 from pointmass.frame import Camera, Frame
+from pointmass.laws import functions as fn
 from pointmass.look import Look
 from pointmass.scene import Scene
 from pointmass.scenes.base import ShippedScene, expect, knob
@@ -61,8 +62,8 @@ class Orbit(ShippedScene):
         a = np.linspace(0.5, 1.4, self.planets)
         turn = 2.399963 * np.arange(self.planets)
         near, fast = a * (1 - e), np.sqrt((1 + e) / (a * (1 - e)))
-        axis = np.stack([np.cos(turn), 0 * turn, np.sin(turn)], axis=1)
-        across = np.stack([-np.sin(turn), 0 * turn, np.cos(turn)], axis=1)
+        axis = np.stack([fn.cos(turn), 0 * turn, fn.sin(turn)], axis=1)
+        across = np.stack([-fn.sin(turn), 0 * turn, fn.cos(turn)], axis=1)
         planets = points(near[:, None] * axis, fast[:, None] * across, 1e-3)
         camera = Camera(azimuth=0, elevation=55)
         return Scene(**common, bodies=[planets], forces=[Attractor(1.0)], camera=camera, look=look)
