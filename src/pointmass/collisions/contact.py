@@ -190,8 +190,10 @@ class Contacts:
         relative = v[rows] - motion
         relative -= rows_dot(relative, stand.normal)[:, None] * stand.normal
         speed = lengths(relative)
-        speed = np.where(speed > _roundoff(v[rows], motion), speed, 0)
+        bounce = np.sqrt(2 * surface.eps * stand.load / m[rows])  # the speed that counts as resting, across the surface
+        speed = np.where(speed > _roundoff(v[rows], motion) + STILL * np.finfo(v.dtype).eps * bounce, speed, 0)
         stand.speed, stand.slide = speed, directions(relative, speed, NONE)
+        v[rows] = np.where((speed == 0)[:, None], motion, v[rows])
         if self.lagged:
             push = a[rows] - surface.acceleration(t[rows])
             along = push - rows_dot(push, stand.normal)[:, None] * stand.normal
