@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import deque
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from PIL import Image
 
 import pointmass as pm
 from pointmass.look import linear
-from pointmass.render import Style, image
+from pointmass.render import image
 
 FOLDER = Path(__file__).parent / "images"
 SIZE = (640, 360)
@@ -37,12 +38,14 @@ def dots(name, points, color, radius):
 def drawing(*drawables):
     """A frame of curves and dots alone."""
     nothing = np.zeros((0, 3))
-    return pm.Frame(number=0, time=0.0, ids=np.zeros(0, int), positions=nothing, velocities=nothing, drawables=drawables)
+    return pm.Frame(
+        number=0, time=0.0, ids=np.zeros(0, int), positions=nothing, velocities=nothing, drawables=drawables
+    )
 
 
-def save(name, frame, camera=FACE_ON, style=None):
+def save(name, frame, camera=FACE_ON):
     """Draw a frame into docs/images."""
-    picture = image(frame, camera=camera, size=SIZE, style=style)
+    picture = image(frame, camera=camera, size=SIZE)
     target = FOLDER / f"{name}.png"
     small = Image.fromarray(picture).quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.FLOYDSTEINBERG)
     small.save(target, optimize=True)
@@ -51,12 +54,10 @@ def save(name, frame, camera=FACE_ON, style=None):
 
 def last(frames):
     """The last of some frames."""
-    for frame in frames:
-        pass
-    return frame
+    return deque(frames, maxlen=1)[0]
 
 
-def shipped(name, count, size=SIZE, **settings):
+def shipped(name, count, **settings):
     """A frame of a scene that comes with pointmass, seen by its own camera."""
     scene = pm.SCENES[name](**settings).build()
     save(f"scene-{name}", last(scene.simulation().frames(count, scene.fps)), scene.camera)
@@ -123,7 +124,11 @@ def bounces():
     path = np.array([f.positions[0] for f in frames])
     lines = (curve("path", path, YELLOW, 0.02), dots("balls", path[::6], linear("#ffb454"), 0.06))
     surface = [d for d in frames[0].drawables if d.kind == "triangles"]
-    save("bounces", drawing(*surface, *lines), pm.Camera(azimuth=0, elevation=6, fov=25, target=(0, 0.6, 0), position=(0, 1.2, 9)))
+    save(
+        "bounces",
+        drawing(*surface, *lines),
+        pm.Camera(azimuth=0, elevation=6, fov=25, target=(0, 0.6, 0), position=(0, 1.2, 9)),
+    )
 
 
 def cloth():

@@ -1,8 +1,9 @@
-"""The documentation is true: its programs run, its numbers are what they print, its scenes load, its links lead somewhere.
+"""The documentation is true: programs run and print what they say, scenes load, links lead somewhere.
 
-A page's ```python blocks run in order as one program, in an empty folder. A block that begins with `# src/...` is a quotation and must
-be found in that file. `# -> text` after a print is what it prints. A ```toml block is a scene; one that begins with
-`# name.toml` is put into the folder as that file, and one that begins with `# fragment` is a part of a scene.
+A page's ```python blocks run in order as one program, in an empty folder. A block that begins with `# src/...` is a
+quotation and must be found in that file. `# -> text` after a print is what it prints. A ```toml block is a scene; one
+that begins with `# name.toml` is put into the folder as that file, and one that begins with `# fragment` is a part of a
+scene.
 """
 
 from __future__ import annotations
