@@ -125,5 +125,5 @@ def _shape(shape: tuple[int | None, ...]) -> str:
 
 
 def _short(value: object) -> str:
-    text = repr(value)
+    text = " ".join(repr(value).split())  # one line, arrays too
     return text if len(text) <= 60 else text[:57] + "..."

@@ -321,7 +321,7 @@ def _check_numbers(value: Any, path: str = "") -> None:
 
 def shown(value: Any) -> str:
     """A value for a message, cut off where it is long, in one line."""
-    text = repr(value)
+    text = " ".join(repr(value).split())
     return text if len(text) <= 60 else text[:57] + "..."
 
 

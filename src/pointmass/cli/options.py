@@ -1,0 +1,163 @@
+"""Options that several commands share, and the scene that they describe."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from pointmass.errors import InvalidInput, number, unknown, whole_number
+
+if TYPE_CHECKING:
+    from pointmass.scene import Scene
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+quiet = click.option("--quiet", "-q", is_flag=True, help="Say nothing but errors.")
+as_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """What a command line says about a run; None = as the scene says.
+
+    Attributes
+    ----------
+    settings : of `--set`, each "name=value".
+    threads : of Numba; changes no result.
+    """
+
+    frames: int | None = None
+    fps: float | None = None
+    dt: float | None = None
+    substeps: int | None = None
+    solver: str | None = None
+    seed: int | None = None
+    dtype: str | None = None
+    threads: int | None = None
+    settings: tuple[str, ...] = ()
+
+    def given(self) -> list[str]:
+        """The options that change a simulation."""
+        values = {name: getattr(self, name) for name in ("frames", "fps", "dt", "substeps", "solver", "seed", "dtype")}
+        return [f"--{name}" for name, value in values.items() if value is not None] + ["--set"] * bool(self.settings)
+
+
+def run_options(command: Command) -> Command:
+    """Add the options of a run; the command takes `RunOptions` with `options_from(**values)`."""
+    for option in reversed(
+        [
+            click.option("--frames", type=int, help="Length of the run."),
+            click.option("--fps", type=float, help="Frames for a second of simulated time [1/s]."),
+            click.option("--dt", type=float, help="Step of the solver [s]."),
+            click.option("--substeps", type=int, help="Steps for each frame: dt = 1/(fps N)."),
+            click.option("--solver", help="Such as rk4; see pointmass list."),
+            click.option("--seed", type=int, help="Seed of all chance while it runs."),
+            click.option("--dtype", help="float64 or float32."),
+            click.option("--threads", type=int, envvar="POINTMASS_THREADS", help="Threads; the result is the same."),
+            click.option(
+                "--set",
+                "settings",
+                multiple=True,
+                metavar="NAME=VALUE",
+                help="Set a parameter of a scene, or a value in a TOML file by its path, such as forces.0.k=0.2.",
+            ),
+        ]
+    ):
+        command = option(command)
+    return command
+
+
+def use_threads(threads: int | None) -> None:
+    """Let Numba run on so many threads; it reads its environment once, when it is imported."""
+    if threads is None:
+        return
+    threads = whole_number("threads", threads, at_least=1)
+    os.environ["NUMBA_NUM_THREADS"] = str(threads)
+    if "numba" in sys.modules:
+        import numba
+        from numba.core import config
+
+        numba.set_num_threads(min(threads, int(config.NUMBA_NUM_THREADS)))
+
+
+def load_scene(source: str, options: RunOptions) -> Scene:
+    """The scene that a command line names, with its options.
+
+    Raises
+    ------
+    InvalidInput
+        No such scene, a file that is no scene, an option that is not allowed.
+    """
+    use_threads(options.threads)
+    if options.dt is not None and options.substeps is not None:
+        raise InvalidInput("--dt and --substeps both set the step: give one of them")
+    return _with_options(_described(source, _settings(options.settings)), options)
+
+
+def default_output(source: str, suffix: str) -> Path:
+    """<scene>.zarr or <scene>.mp4 in the current folder."""
+    return Path(f"{Path(source).stem}{suffix}")
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Width and height [pixels] from text such as 1280x720."""
+    match = re.fullmatch(r"(\d{1,6})[xX](\d{1,6})", text)
+    if not match:
+        raise InvalidInput(f"--size {text!r} is not allowed: write width and height in pixels, such as 1280x720")
+    return int(match[1]), int(match[2])
+
+
+def _described(source: str, settings: dict[str, Any]) -> Scene:
+    path = Path(source)
+    if path.suffix == ".toml" or path.is_file():
+        from pointmass.scene import Scene
+
+        return Scene.load(path, settings)
+    from pointmass.scenes import SCENES
+
+    if source in SCENES:
+        return SCENES[source].with_settings(settings).build()
+    if path.is_dir():
+        raise InvalidInput(f"{source!r} is a folder, not a scene: give a TOML file or one of {', '.join(SCENES)}")
+    raise unknown("scene", source, SCENES)
+
+
+def _with_options(scene: Scene, options: RunOptions) -> Scene:
+    from pointmass.solvers import find_solver
+
+    changes: dict[str, Any] = {name: getattr(options, name) for name in ("frames", "fps", "dt", "seed", "dtype")}
+    if options.solver is not None:
+        changes["solver"] = find_solver(options.solver)()
+    changes = {name: value for name, value in changes.items() if value is not None}
+    if options.substeps is not None:
+        fps = number("fps", changes.get("fps", scene.fps), above=0, unit="1/s")
+        changes["dt"] = 1 / (fps * whole_number("substeps", options.substeps, at_least=1))
+    return scene.changed(**changes) if changes else scene
+
+
+def _settings(texts: tuple[str, ...]) -> dict[str, Any]:
+    """Values by name; each is read as a TOML value, or else as text."""
+    result: dict[str, Any] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        name = name.strip()
+        if not equals or not name:
+            raise InvalidInput(f"--set {text!r} is not allowed: write name=value, such as k=0.2")
+        result[name] = _value(value.strip())
+    return result
+
+
+def _value(text: str) -> Any:
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        return text
+    return parsed["value"] if list(parsed) == ["value"] else text

@@ -1,0 +1,198 @@
+"""`pointmass render`."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from pointmass.cli.main import Interrupted
+from pointmass.cli.options import (
+    RunOptions,
+    as_json,
+    default_output,
+    load_scene,
+    parse_size,
+    quiet,
+    run_options,
+    use_threads,
+)
+from pointmass.cli.progress import progress
+from pointmass.cli.report import Report, counted
+from pointmass.cli.run import simulate
+from pointmass.errors import Diverged, InvalidInput, number, unknown
+
+if TYPE_CHECKING:
+    from pointmass.cache import Cache
+    from pointmass.frame import Camera, Frame
+
+SAMPLES = 48  # frames that an automatic camera looks at
+
+
+@click.command("render")
+@click.argument("source", metavar="SCENE|CACHE")
+@click.option(
+    "-o", "--output", help="A film (.mp4, .webm, .gif) or picture (.png, x_%04d.png); <scene>.mp4 by default."
+)
+@click.option("--frame", type=int, help="For a .png: the number of the frame, counted from 0; the last by default.")
+@click.option("--size", default="1280x720", show_default=True, help="Width and height [pixels].")
+@click.option("--caption", is_flag=True, help="Write time and quantities into the picture.")
+@click.option("--azimuth", type=float, help="Direction from which the camera looks [degrees].")
+@click.option("--elevation", type=float, help="Likewise, above the horizon [degrees].")
+@click.option("--fov", type=float, help="Vertical angle of view [degrees].")
+@run_options
+@as_json
+@quiet
+def command(
+    source: str,
+    output: str | None,
+    frame: int | None,
+    size: str,
+    caption: bool,
+    azimuth: float | None,
+    elevation: float | None,
+    fov: float | None,
+    as_json: bool,
+    quiet: bool,
+    **values: Any,
+) -> None:
+    """Make a film or a picture of a scene, or of a cache."""
+    options = RunOptions(**values)
+    path = Path(output) if output is not None else default_output(source, ".mp4")
+    report = Report(command="render", path=path)
+    view = {"azimuth": azimuth, "elevation": elevation, "fov": fov}
+    drawing = Drawing(path, parse_size(size), frame, caption, view, quiet)
+    try:
+        if Path(source).is_dir():
+            _from_cache(source, options, drawing, report)
+        else:
+            _from_scene(source, options, drawing, report)
+    except KeyboardInterrupt:
+        report.frames, report.interrupted = 0, True
+        report.show(as_json, quiet)
+        raise Interrupted(f"interrupted: {str(path)!r} was not written") from None
+    report.show(as_json, quiet)
+    if report.diverged is not None:
+        raise Diverged(f"{report.diverged}; {str(path)!r} holds the {counted(report.frames)} before it")
+
+
+class Drawing:
+    """What to draw and where, checked before anything is simulated.
+
+    Raises
+    ------
+    InvalidInput
+        An option that is not allowed, or a file that cannot be written.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        size: tuple[int, int],
+        frame: int | None,
+        caption: bool,
+        view: dict[str, float | None],
+        quiet: bool,
+    ) -> None:
+        from pointmass.render.image import checked_size
+
+        self.path, self.frame, self.caption, self.quiet = path, frame, caption, quiet
+        self.size = checked_size(size)
+        self.view = {name: number(name, value, unit="degrees") for name, value in view.items() if value is not None}
+        self._check_path()
+        self.camera_with(None)
+
+    @property
+    def single(self) -> bool:
+        """Whether it is one picture."""
+        return self.path.suffix.lower() == ".png" and "%" not in self.path.name
+
+    def check_frame(self, count: int) -> None:
+        """Refuse a frame that is not there."""
+        if self.frame is not None and not 0 <= self.frame < count:
+            raise InvalidInput(f"--frame {self.frame} is not allowed: there are {counted(count)}, counted from 0")
+
+    def camera_with(self, camera: Camera | None) -> Camera:
+        """A camera as the options say; a direction replaces a position."""
+        from pointmass.frame import Camera
+
+        turned = {"position": None} if {"azimuth", "elevation"} & set(self.view) else {}
+        changes: dict[str, Any] = {**turned, **self.view}
+        return replace(camera or Camera(), **changes)
+
+    def draw(self, cache: Cache) -> int:
+        """Draw the frames of a cache; returns how many."""
+        from pointmass.render import Style, fit_camera, write
+
+        self.check_frame(len(cache))
+        camera = fit_camera(_sample(cache), self.camera_with(cache.camera), self.size)
+        last = len(cache) - 1 if self.frame is None else self.frame
+        frames: Iterator[Frame] = iter([cache[last]]) if self.single else iter(cache)
+        total = 1 if self.single else len(cache)
+        style = Style(caption=self.caption)
+        with progress("rendering", total, self.quiet) as tick:
+            write(frames, self.path, fps=cache.fps, camera=camera, size=self.size, style=style, progress=tick)
+        return total
+
+    def _check_path(self) -> None:
+        from pointmass.render import WRITERS
+
+        path = self.path
+        if path.suffix.lower() not in WRITERS:
+            raise unknown("kind of picture or film", path.suffix, WRITERS)
+        if not path.parent.is_dir():
+            raise InvalidInput(f"cannot write {str(path)!r}: there is no folder {str(path.parent)!r}")
+        if path.is_dir():
+            raise InvalidInput(f"cannot write {str(path)!r}: it is a folder")
+        if self.frame is not None and not self.single:
+            raise InvalidInput(f"--frame belongs to a single picture such as x.png, not to {path.name!r}")
+
+
+def _from_cache(source: str, options: RunOptions, drawing: Drawing, report: Report) -> None:
+    from pointmass.cache import Cache
+
+    if options.given():
+        raise InvalidInput(f"{options.given()[0]} cannot change the cache {source!r}: render the scene instead")
+    use_threads(options.threads)
+    cache = Cache.open(source)
+    if not len(cache):
+        raise InvalidInput(f"the cache {source!r} has no frames: run the scene again")
+    report.frames = drawing.draw(cache)
+
+
+def _from_scene(source: str, options: RunOptions, drawing: Drawing, report: Report) -> None:
+    """Simulate into a cache beside the output, so that the camera can see the whole run, and draw that."""
+    from pointmass.cache import Cache
+
+    scene = load_scene(source, options)
+    number("fps", scene.fps, above=0, at_most=1000, unit="1/s")
+    drawing.check_frame(scene.frames)
+    if drawing.frame is not None:
+        options = replace(options, frames=drawing.frame + 1)
+    with _folder_beside(drawing.path) as folder:
+        cache = Path(folder) / "run.zarr"
+        try:
+            simulate(source, options, cache, report, drawing.quiet, overwrite=False)
+        except Diverged as error:
+            report.diverged = error
+            if drawing.frame is not None or not report.frames:
+                report.frames = 0
+                raise Diverged(f"{error}; {str(drawing.path)!r} was not written") from error
+        report.frames = drawing.draw(Cache.open(cache))
+
+
+def _folder_beside(path: Path) -> Any:
+    try:
+        return tempfile.TemporaryDirectory(prefix=".pointmass-", dir=path.parent, ignore_cleanup_errors=True)
+    except OSError as error:
+        raise InvalidInput(f"cannot write into folder {str(path.parent)!r}: {error.strerror}") from None
+
+
+def _sample(cache: Cache) -> list[Frame]:
+    """Frames spread evenly over the run, the first and the last among them."""
+    count = min(SAMPLES, len(cache))
+    return [cache[round(k * (len(cache) - 1) / max(1, count - 1))] for k in range(count)]

@@ -1,0 +1,63 @@
+"""`pointmass run`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from pointmass.cli.main import Interrupted
+from pointmass.cli.options import RunOptions, as_json, default_output, load_scene, quiet, run_options
+from pointmass.cli.progress import progress
+from pointmass.cli.report import Report, counted
+from pointmass.errors import Diverged
+
+
+@click.command("run")
+@click.argument("scene")
+@click.option("-o", "--output", help="The cache, a folder; <scene>.zarr by default.")
+@run_options
+@as_json
+@quiet
+def command(scene: str, output: str | None, as_json: bool, quiet: bool, **values: Any) -> None:
+    """Simulate SCENE into a cache.
+
+    A cache that is there already is replaced. Frames are written one by one: whatever stops the run, the cache holds
+    those before.
+    """
+    options = RunOptions(**values)
+    path = Path(output) if output is not None else default_output(scene, ".zarr")
+    report = Report(command="run", path=path)
+    try:
+        simulate(scene, options, path, report, quiet, overwrite=True)
+    except Diverged as error:
+        report.diverged = error
+        report.show(as_json, quiet)
+        raise _kept(error, report) from error
+    except KeyboardInterrupt:
+        report.interrupted = True
+        report.show(as_json, quiet)
+        kept = f"{counted(report.frames)} kept in {str(path)!r}" if report.frames else "nothing was written"
+        raise Interrupted(f"interrupted: {kept}") from None
+    report.show(as_json, quiet)
+
+
+def simulate(source: str, options: RunOptions, path: Path, report: Report, quiet: bool, *, overwrite: bool) -> None:
+    """Simulate a scene into a cache, and count its frames in the report."""
+    from pointmass.cache import check_target, record
+
+    scene = load_scene(source, options)
+    check_target(path, overwrite)
+    simulation = scene.simulation()
+    with progress("simulating", scene.frames, quiet) as tick:
+
+        def count(frames: int) -> None:
+            report.frames = frames
+            tick(frames)
+
+        record(simulation, path, scene.frames, scene.fps, scene=scene, overwrite=overwrite, progress=count)
+
+
+def _kept(error: Diverged, report: Report) -> Diverged:
+    return Diverged(f"{error}; {counted(report.frames)} kept in {str(report.path)!r}")
