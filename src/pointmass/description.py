@@ -69,7 +69,8 @@ def same(a: Any, b: Any) -> bool:
             return False
     if isinstance(a, (list, tuple)) and isinstance(b, (list, tuple)):
         return len(a) == len(b) and all(same(p, q) for p, q in zip(a, b, strict=True))
-    return type(a) is type(b) and a == b or (isinstance(a, (int, float)) and isinstance(b, (int, float)) and a == b)
+    alike = type(a) is type(b) or (isinstance(a, (int, float)) and isinstance(b, (int, float)))
+    return alike and bool(a == b)
 
 
 def _takes_any(factory: Any) -> bool:

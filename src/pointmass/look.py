@@ -47,7 +47,8 @@ class Look:
     trails : length of the particles' trails [s], 0 = none.
     arrows : arrows of a flow along the longest side, 0 = none.
     streamlines : integral curves of a flow, 0 = none.
-    field_box : corners of the box in which arrows and integral curves are drawn [m]; None = that of the particles at the start.
+    field_box : corners of the box in which arrows and integral curves are drawn [m]; None = that of the particles at
+        the start.
     colliders : whether surfaces are drawn, in `collider_color`.
     floor_size : edge of the part of an infinite plane that is drawn [m]; None = 3 times the scene, and for a floor as
         far as one can see.
@@ -110,7 +111,7 @@ class Look:
             result += stage.trails.drawn(self, system.particles.id, colors, extent, frame)
         if self.particles != "none" and len(x):
             own = system.particles.radius
-            radius = np.float32(self.size) if self.size else np.where(own > 0, own, 0.01 * extent).astype(np.float32)
+            radius = self.size or np.where(own > 0, own, 0.01 * extent).astype(np.float32)
             result.append(
                 Points(name="particles", version=frame, radius=radius, color=colors, glow=self.particles == "glow")
             )
@@ -147,7 +148,7 @@ class Look:
         )
 
     def _springs(self, system: ParticleSystem, extent: float) -> list[Drawable]:
-        width = np.float32(self.spring_width or 0.003 * extent)
+        width = self.spring_width or 0.003 * extent
         result: list[Drawable] = []
         for k, force in enumerate(system.forces):
             if isinstance(force, Springs) and len(force.ids):
@@ -182,6 +183,8 @@ class Stage:
     """
 
     def __init__(self, look: Look, x: Array) -> None:
+        self.low: Array
+        self.high: Array
         self.low, self.high = _bounds(x) if look.field_box is None else np.array(look.field_box, np.float64)
         self.extent = _extent(x)
         self.trails = Trails(look)
@@ -259,7 +262,7 @@ def _bounds(x: Array) -> tuple[Array, Array]:
     """Corners of the box of the particles; a box of no size is 2 m wide."""
     low, high = (x.min(axis=0), x.max(axis=0)) if len(x) else (np.zeros(3), np.zeros(3))
     if not (high > low).any():
-        low, high = low - (1, 1, 0), high + (1, 1, 0)
+        low, high = low - np.array([1, 1, 0]), high + np.array([1, 1, 0])
     return low.astype(np.float64), high.astype(np.float64)
 
 
@@ -328,7 +331,7 @@ def _streamlines(system: ParticleSystem, t: float, low: Array, high: Array, coun
     for _ in range(CURVE_STEPS):
         path.append(solver.step(curve, 0.0, path[-1], step, {}).y1)
     points = np.stack(path).reshape(len(path), -1, 3).transpose(1, 0, 2)
-    inside = ((points >= low - 1e-9) & (points <= high + 1e-9)).all(axis=2)
+    inside = np.all((points >= low - 1e-9) & (points <= high + 1e-9), axis=2)
     length = np.where(inside.all(axis=1), points.shape[1], np.argmin(inside, axis=1))
     keep = np.arange(points.shape[1])[None, :] < length[:, None]
     return Curves(

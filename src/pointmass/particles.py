@@ -78,7 +78,7 @@ class Particles:
     @property
     def pinned(self) -> NDArray[np.bool_]:
         """Which particles are held where they are, shape (n,)."""
-        return self.w == 0
+        return np.equal(self.w, 0)
 
     def add(
         self,

@@ -1,7 +1,7 @@
 """Chance without streams: every number is a hash of (seed, stream, id, purpose).
 
-Salmon et al., Parallel random numbers: as easy as 1, 2, 3 (SC 2011), Philox 4x32 with 10 rounds. No draw depends on any other,
-so results do not change with threads, batches, order, frame rate or restarts.
+Salmon et al., Parallel random numbers: as easy as 1, 2, 3 (SC 2011), Philox 4x32 with 10 rounds. No draw depends on
+any other, so results do not change with threads, batches, order, frame rate or restarts.
 """
 
 from __future__ import annotations

@@ -46,8 +46,8 @@ class Energy:
 class ParticleSystem:
     """Point masses, the forces on them, and what they bounce off.
 
-    A solver sees `dim`, `get_state`, `set_state` and `deriv_eval`. The state is `y = [x.ravel(), v.ravel()]`, of length 6n (the
-    lecture's slide interleaves x1 v1 x2 v2 ...; the numbers are the same). A system whose forces are velocity
+    A solver sees `dim`, `get_state`, `set_state` and `deriv_eval`. The state is `y = [x.ravel(), v.ravel()]`, of length
+    6n (the lecture's slide interleaves x1 v1 x2 v2 ...; the numbers are the same). A system whose forces are velocity
     fields (`Flow`, `Vortex`) has order 1: x' = g(x, t), y = x.ravel(), of length 3n.
 
     Parameters
@@ -108,8 +108,8 @@ class ParticleSystem:
     def deriv_eval(self, t: Any = None, y: Array | None = None) -> Array:
         """dy/dt at time `t` and state `y` (by default the present ones), shape (dim,).
 
-        It is a pure function of (t, y): the particles stay as they are, only their accumulators f are used. `t` may be an array of
-        shape (dim,): islands with clocks of their own.
+        It is a pure function of (t, y): the particles stay as they are, only their accumulators f are used. `t` may be
+        an array of shape (dim,): islands with clocks of their own.
         """
         y = self.get_state() if y is None else self._checked(y)
         t = self._particle_time(self.t if t is None else t)
@@ -212,12 +212,12 @@ class ParticleSystem:
 
     def momentum(self) -> Array:
         """Total momentum [kg m/s], shape (3,)."""
-        return np.einsum("i,ij->j", self.particles.m, self.particles.v)
+        return np.asarray(np.einsum("i,ij->j", self.particles.m, self.particles.v))
 
     def angular_momentum(self) -> Array:
         """Total angular momentum about the origin [kg m^2/s], shape (3,)."""
         p = self.particles
-        return np.einsum("i,ij->j", p.m, np.cross(p.x, p.v))
+        return np.asarray(np.einsum("i,ij->j", p.m, np.cross(p.x, p.v)))
 
     def stretch(self) -> float:
         """Largest relative change of a spring's length; 0 without springs."""

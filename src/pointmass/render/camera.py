@@ -234,14 +234,16 @@ def _robust(rows: Vector, percentiles: bool) -> Vector:
     if len(rows) <= MANY:
         return rows
     # A film has too many frames to keep all balls: the outermost in many directions stand for the hull.
-    return rows[np.unique(np.argmax(rows[:, :3] @ DIRECTIONS.T + rows[:, 3:], axis=0))]
+    outermost: Vector = rows[np.unique(np.argmax(rows[:, :3] @ DIRECTIONS.T + rows[:, 3:], axis=0))]
+    return outermost
 
 
 def _near(meshes: Vector, found: Vector) -> Vector:
     """Corners of static meshes within a box a little larger than the particles'; a floor's are far away."""
     low, high = (found[:, :3] - found[:, 3:]).min(axis=0), (found[:, :3] + found[:, 3:]).max(axis=0)
     room = 0.25 * float(np.linalg.norm(high - low))
-    return meshes[((meshes[:, :3] >= low - room) & (meshes[:, :3] <= high + room)).all(axis=1)]
+    near: Vector = meshes[((meshes[:, :3] >= low - room) & (meshes[:, :3] <= high + room)).all(axis=1)]
+    return near
 
 
 def _triple(vector: Vector) -> tuple[float, float, float]:

@@ -114,9 +114,7 @@ def _table(rows: F64, glow: bool, view: View, curve: Ints | None = None, flat: b
         rows[drawn, 20:22] = step[drawn] / length[drawn, None]
     reach = np.maximum(radius_a, radius_b)
     broad = np.maximum(GLOW_REACH * reach, MIN_GLOW) if glow else reach + 1.0
-    box = pixel_box(
-        np.minimum(a, b) - broad[:, None], np.maximum(a, b) + broad[:, None], view.width, view.height
-    )
+    box = pixel_box(np.minimum(a, b) - broad[:, None], np.maximum(a, b) + broad[:, None], view.width, view.height)
     solid = (np.minimum(rows[:, 15], rows[:, 19]) >= OPAQUE) & (reach >= SOLID) & (not glow)
     depth = 0.5 * (rows[:, 2] + rows[:, 5])
     return Table(rows.astype(np.float32), box, depth, solid, np.full(len(rows), glow))

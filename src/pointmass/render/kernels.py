@@ -368,9 +368,7 @@ def _capsule_color(c, t, left, radius, z, px, py, camera, lamp, shadow, matrix):
     nx, ny, nz = _unit(s * lx + front * fx, s * ly + front * fy, s * lz + front * fz)
     dark = ONE - FALLOFF * (ONE - front) * (ONE - front)
     r, g, b = c[12] + t * (c[16] - c[12]), c[13] + t * (c[17] - c[13]), c[14] + t * (c[18] - c[14])
-    return _shade(
-        dx * z, dy * z, z, nx, ny, nz, r * dark, g * dark, b * dark, GLOSS_LINE, lamp, shadow, matrix
-    )
+    return _shade(dx * z, dy * z, z, nx, ny, nz, r * dark, g * dark, b * dark, GLOSS_LINE, lamp, shadow, matrix)
 
 
 @inner
@@ -404,9 +402,7 @@ def _capsule_solid(c, box, top, bottom, light, depth, shape, camera, offsets, la
             sx, sy = sx / np.float32(hits), sy / np.float32(hits)
             t, _, left = _across(c, ra, rb, sx, sy)
             z = ONE / (wa + t * (wb - wa))
-            r, g, b = _capsule_color(
-                c, t, left, ra + t * (rb - ra), z, sx, sy, camera, lamp, shadow, matrix
-            )
+            r, g, b = _capsule_color(c, t, left, ra + t * (rb - ra), z, sx, sy, camera, lamp, shadow, matrix)
             _write(light, first, samples, mask, ONE, r, g, b)
 
 

@@ -59,7 +59,7 @@ class FlowScene(ShippedScene):
         )
 
     def check(self, frames: Sequence[Frame]) -> None:
-        """The flow is along the walls, so nothing leaves; where it is steady, particles stay on their integral curves."""
+        """The flow is along the walls, so nothing leaves; in a steady one, particles stay on their integral curves."""
         end = frames[-1].positions
         inside = ((end[:, :2] > 0) & (end[:, :2] < (2.0, 1.0))).all()
         expect(bool(inside), "a particle left the box along whose walls it flows")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pointmass.bodies import points
+from pointmass.bodies import Body, points
 from pointmass.forces import Attractor, Gravitation
 from pointmass.frame import Camera, Frame
 from pointmass.laws import functions as fn
@@ -36,37 +36,25 @@ class Orbit(ShippedScene):
     def build(self) -> Scene:
         """G = 1 and masses of order 1: a second is a fraction of an orbit."""
         eight = self.kind == "figure_eight"
-        common = {
-            "name": self.name,
-            "summary": self.summary(),
-            "dt": 1 / self.steps_per_second,
-            "solver": Leapfrog(),
-            "frames": 380 if eight else 480,
-        }
-        look = Look(
-            particles="glow",
-            color_by="id",
-            color_range=(0.0, 1.0),
-            palette="spectrum" if eight else "fire",
-            size=0.055,
-            trails=self.trail,
-            brightness=2.0,
+        return Scene(
+            name=self.name,
+            summary=self.summary(),
+            dt=1 / self.steps_per_second,
+            solver=Leapfrog(),
+            frames=380 if eight else 480,
+            bodies=[_figure_eight() if eight else _planets(self.planets)],
+            forces=[Gravitation() if eight else Attractor(1.0)],
+            camera=Camera(azimuth=0, elevation=0 if eight else 55),
+            look=Look(
+                particles="glow",
+                color_by="id",
+                color_range=(0.0, 1.0),
+                palette="spectrum" if eight else "fire",
+                size=0.055,
+                trails=self.trail,
+                brightness=2.0,
+            ),
         )
-        if eight:
-            x1, v3 = np.array(EIGHT_X), np.array(EIGHT_V)
-            stars = points([x1, -x1, (0, 0)], [-v3 / 2, -v3 / 2, v3])
-            return Scene(
-                **common, bodies=[stars], forces=[Gravitation()], camera=Camera(azimuth=0, elevation=0), look=look
-            )
-        e = np.linspace(0, 0.8, self.planets) if self.planets > 1 else np.array([0.5])
-        a = np.linspace(0.5, 1.4, self.planets)
-        turn = 2.399963 * np.arange(self.planets)
-        near, fast = a * (1 - e), np.sqrt((1 + e) / (a * (1 - e)))
-        axis = np.stack([fn.cos(turn), 0 * turn, fn.sin(turn)], axis=1)
-        across = np.stack([-fn.sin(turn), 0 * turn, fn.cos(turn)], axis=1)
-        planets = points(near[:, None] * axis, fast[:, None] * across, 1e-3)
-        camera = Camera(azimuth=0, elevation=55)
-        return Scene(**common, bodies=[planets], forces=[Attractor(1.0)], camera=camera, look=look)
 
     def check(self, frames: Sequence[Frame]) -> None:
         """Leapfrog keeps the energy within the error of its order, and the momentum of the eight to round-off."""
@@ -77,3 +65,19 @@ class Orbit(ShippedScene):
         if self.kind == "figure_eight":
             total = max(math.hypot(f.quantities["momentum_x"], f.quantities["momentum_y"]) for f in frames)
             expect(total < 1e-11, f"the total momentum grew to {total:.2g} kg m/s")
+
+
+def _figure_eight() -> Body:
+    x1, v3 = np.array(EIGHT_X), np.array(EIGHT_V)
+    return points([x1, -x1, (0, 0)], [-v3 / 2, -v3 / 2, v3])
+
+
+def _planets(count: int) -> Body:
+    """Planets at perihelion, each with a larger orbit and a larger eccentricity than the one before."""
+    e = np.linspace(0, 0.8, count) if count > 1 else np.array([0.5])
+    a = np.linspace(0.5, 1.4, count)
+    turn = 2.399963 * np.arange(count)
+    near, fast = a * (1 - e), np.sqrt((1 + e) / (a * (1 - e)))
+    axis = np.stack([fn.cos(turn), 0 * turn, fn.sin(turn)], axis=1)
+    across = np.stack([-fn.sin(turn), 0 * turn, fn.cos(turn)], axis=1)
+    return points(near[:, None] * axis, fast[:, None] * across, 1e-3)
