@@ -83,9 +83,8 @@ def use_threads(threads: int | None) -> None:
     os.environ["NUMBA_NUM_THREADS"] = str(threads)
     if "numba" in sys.modules:
         import numba
-        from numba.core import config
 
-        numba.set_num_threads(min(threads, int(config.NUMBA_NUM_THREADS)))
+        numba.set_num_threads(min(threads, numba.get_num_threads()))
 
 
 def load_scene(source: str, options: RunOptions) -> Scene:

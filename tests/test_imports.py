@@ -1,0 +1,86 @@
+"""What loads what: importing pointmass is quick, and the layers hold."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import pointmass as pm
+
+HEAVY = ("numba", "scipy", "pydantic", "zarr", "numcodecs", "av", "PIL", "rich", "click", "starlette", "matplotlib")
+SOURCES = Path(pm.__file__).parent
+MARGIN = 4 if "CI" in os.environ else 2  # machines that test are busy
+
+
+def loaded_by(code: str) -> set[str]:
+    program = f"{code}\nimport sys, json; print(json.dumps(sorted(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
+    return {name.split(".")[0] for name in json.loads(done.stdout.splitlines()[-1])}
+
+
+def seconds(*command: str) -> float:
+    best = float("inf")
+    for _ in range(5):
+        start = time.perf_counter()
+        subprocess.run([sys.executable, *command], check=True, capture_output=True)
+        best = min(best, time.perf_counter() - start)
+    return best
+
+
+def test_importing_pointmass_loads_nothing_heavy() -> None:
+    assert not loaded_by("import pointmass") & {*HEAVY}
+
+
+def test_a_scene_in_python_needs_no_film_or_cache() -> None:
+    code = "import pointmass as pm; pm.Scene(bodies=[pm.chain(2)], forces=[pm.Gravity()]).simulation()"
+    assert not loaded_by(code) & {"numba", "scipy", "pydantic", "zarr", "av", "rich", "click"}
+
+
+def test_importing_pointmass_is_quick() -> None:
+    assert seconds("-c", "import pointmass") < 0.25 * MARGIN
+
+
+def test_listing_scenes_is_quick() -> None:
+    assert not loaded_by("import pointmass.cli, pointmass.scenes") & {
+        "numba",
+        "scipy",
+        "pydantic",
+        "zarr",
+        "av",
+        "rich",
+    }
+    assert seconds("-m", "pointmass.cli", "list", "--json") < 0.6 * MARGIN
+
+
+@pytest.mark.parametrize("name", pm.__all__)
+def test_every_public_name_is_there_and_explained(name: str) -> None:
+    value = getattr(pm, name)
+    assert name in dir(pm)
+    if callable(value):
+        assert (value.__doc__ or "").strip(), f"{name} has no docstring"
+
+
+def test_an_unknown_name_is_refused() -> None:
+    with pytest.raises(AttributeError, match="pointmass has no 'Gravty'"):
+        _ = pm.Gravty  # type: ignore[attr-defined]
+
+
+def test_numba_is_imported_by_kernels_and_on_first_use_only() -> None:
+    for path in SOURCES.rglob("*.py"):
+        where = path.relative_to(SOURCES).as_posix()
+        tree = ast.parse(path.read_text())
+        first = {id(node) for node in tree.body}
+        for node in ast.walk(tree):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            if any(name.split(".")[0] == "numba" for name in names):
+                kernel = path.name.startswith("kernels") or where == "render/inner.py"
+                lazy = id(node) not in first and where.split("/")[0] in ("render", "engine", "cli")
+                assert kernel or lazy, f"{where} line {node.lineno} imports numba"
