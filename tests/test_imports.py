@@ -40,7 +40,7 @@ def test_importing_pointmass_loads_nothing_heavy() -> None:
 
 def test_a_scene_in_python_needs_no_film_or_cache() -> None:
     code = "import pointmass as pm; pm.Scene(bodies=[pm.chain(2)], forces=[pm.Gravity()]).simulation()"
-    assert not loaded_by(code) & {"numba", "scipy", "pydantic", "zarr", "av", "rich", "click"}
+    assert not loaded_by(code) & {"numba", "pydantic", "zarr", "av", "rich", "click"}
 
 
 def test_importing_pointmass_is_quick() -> None:
