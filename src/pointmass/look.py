@@ -26,7 +26,7 @@ PALETTES = {  # sRGB anchors from low to high
     "aurora": ("#16324f", "#18a999", "#7ae582", "#f6f740", "#ff6f91"),
 }
 CURVE_STEPS = 60
-FAMILY_COLORS = {"stretch": "#5fa8ff", "shear": "#5fe3a1", "bend": "#ff6b6b"}  # as on the lecture's cloth slide
+FAMILY_COLORS = {"stretch": "#5fa8ff", "shear": "#5fe3a1", "bend": "#ff6b6b", "volume": "#ff6b6b"}  # as on the slide
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -68,10 +68,17 @@ class ParticleSystem:
     >>> scipy.integrate.solve_ivp(system.deriv_eval, (0, 1), system.get_state())
     """
 
-    def __init__(self, particles: Particles, forces: Iterable[Force] = (), colliders: Iterable[Collider] = ()) -> None:
+    def __init__(
+        self,
+        particles: Particles,
+        forces: Iterable[Force] | Force = (),
+        colliders: Iterable[Collider] | Collider = (),
+    ) -> None:
+        if not isinstance(particles, Particles):
+            raise InvalidInput(f"particles must be pm.Particles(...), such as a body's .particles, not {particles!r:.60}")
         self.particles = particles
-        self.forces = list(forces)
-        self.colliders = list(colliders)
+        self.forces = [forces] if isinstance(forces, Force) else list(forces)
+        self.colliders = [colliders] if isinstance(colliders, Collider) else list(colliders)
         self.filter: Filter | None = None
         self.t = 0.0
         self._islands: tuple[Any, NDArray[np.intp]] | None = None
@@ -124,17 +131,20 @@ class ParticleSystem:
         """1. Loop over particles, zero the force accumulators."""
         self.particles.f[:] = 0
 
-    def calculate_forces(self, t: Any, x: Array, v: Array) -> None:
-        """2. Sum all forces into the accumulators; a surface bears what rests on it."""
+    def calculate_forces(self, t: Any = None, x: Array | None = None, v: Array | None = None) -> None:
+        """2. Sum all forces into the accumulators, by default those of now; a surface bears what rests on it."""
+        t = self.t if t is None else t
+        x, v = self.particles.x if x is None else x, self.particles.v if v is None else v
         for force in self.forces:
             if force.enabled:
                 force.add_forces(self.particles, t, x, v, self.particles.f)
         if self.filter is not None:
             self.filter.forces(t, x, v, self.particles.m, self.particles.f)
 
-    def gather(self, v: Array) -> Array:
+    def gather(self, v: Array | None = None) -> Array:
         """3. Loop over particles, copying v and f/m into the result. Pinned particles have v = 0 and 1/m = 0."""
         p = self.particles
+        v = p.v if v is None else v
         if self.order == 1:
             return np.where(p.pinned[:, None], 0, p.f).ravel()
         free = p.w[:, None] > 0

@@ -15,7 +15,7 @@ from pointmass.forces.springs import Springs
 from pointmass.laws import functions as fn
 from pointmass.particles import Particles
 
-FAMILIES = {"stretch": 1, "shear": 2, "bend": 3}  # lattice steps between the ends: along an edge, a face, the body
+FAMILIES = {"stretch": 1, "shear": 2, "volume": 3}  # lattice steps between the ends: along an edge, a face, the body
 
 
 @body

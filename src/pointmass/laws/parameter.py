@@ -143,7 +143,7 @@ class Parameter:
         if not isinstance(value, str) and _ndim(value) == 2:
             return list(finite_array(self.name, value, (None, 3)).T)
         if isinstance(value, str) or not hasattr(value, "__len__") or len(value) not in (2, 3):
-            raise InvalidInput(f"{self.name} must be three numbers or formulas, not {value!r}")
+            raise InvalidInput(f"{self.name} must be three numbers or formulas, such as (0, -9.81, 0), not {value!r}")
         return [*value, 0.0][:3]
 
     def _part(self, vector: Any, axis: int) -> Any:
