@@ -31,7 +31,8 @@ class Simulation:
     ----------
     system : belongs to the simulation from now on.
     solver : SymplecticEuler() by default, RK4() for a flow.
-    dt : the solver's step [s], on the grid t0 + k dt with whole k; 1/240 by default. An adaptive solver makes steps of its own
+    dt : the solver's step [s], on the grid t0 + k dt with whole k; 1/240 by default. An adaptive solver makes steps
+        of its own
         in between. How often frames are looked at changes nothing.
     emitters : where particles come from.
     look : how frames look.
@@ -107,7 +108,8 @@ class Simulation:
     def frames(self, count: int, fps: float = 60.0) -> Iterator[Frame]:
         """Run and look: `count` frames, the first one at once, then one every 1/fps s.
 
-        A second call goes on where the first one ended. A frame that falls between two steps is interpolated (dense output); it
+        A second call goes on where the first one ended. A frame that falls between two steps is interpolated (dense
+        output); it
         changes no state, so the run is the same for any fps.
 
         Raises
@@ -131,7 +133,9 @@ class Simulation:
         """
         system, now = self.system, self.t if t is None else t
         if not self._grid(max(self.steps - 1, 0)) <= now <= self.t:
-            raise InvalidInput(f"t = {t} is not allowed: only the last step, which ended at {self.t} s, can be looked at")
+            raise InvalidInput(
+                f"t = {t} is not allowed: only the last step, which ended at {self.t} s, can be looked at"
+            )
         p = system.particles
         x, v = system.split(self.engine.state_at(now)) if now < self.t else (p.x, p.v)
         self._stage.trails.remember(now, p.id, x)
@@ -147,7 +151,8 @@ class Simulation:
         )
 
     def quantities(self) -> dict[str, float]:
-        """Diagnostics now: energies [J], momentum [kg m/s], largest relative stretch of a spring, number of particles."""
+        """Diagnostics now: energies [J], momentum [kg m/s], largest relative stretch of a spring, number of
+        particles."""
         system = self.system
         result = {"particles": float(len(system.particles))}
         if system.order == 2:
@@ -237,7 +242,8 @@ class Simulation:
     # ------------------------------------------------------------------------------------------------ divergence
 
     def _natural_speed(self) -> float:
-        """The largest speed that the start explains: that of the particles, of their fall for a second, across the scene."""
+        """The largest speed that the start explains: that of the particles, of their fall for a second, across the
+        scene."""
         system, p = self.system, self.system.particles
         if not len(p):
             return 10.0
@@ -288,7 +294,8 @@ class Simulation:
 
 
 def culprit(system: ParticleSystem) -> tuple[int, str, list[int]]:
-    """Row of the particle that is worst off, the force that acts most on it, and rows of its partners in that force."""
+    """Row of the particle that is worst off, the force that acts most on it, and rows of its partners in that
+    force."""
     p = system.particles
     if not len(p):
         return 0, "none", []

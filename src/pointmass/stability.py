@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,11 @@ from pointmass.solvers.stability import largest_safe_step
 if TYPE_CHECKING:
     from pointmass.system import ParticleSystem
 
-DENSE = 900  # up to this dimension all eigenvalues are computed, beyond it those of largest size
-WANTED = 12
+DENSE = 900  # islands up to this dimension are solved for all eigenvalues
+WORK = 2  # as long as that is no more work than for this many of them
+WANTED = 4  # eigenvalues of each kind in larger systems
+ACCURACY = 1e-9
+ITERATION: dict[str, Any] = {"ncv": 80, "maxiter": 100, "tol": ACCURACY}
 
 
 @dataclass(frozen=True)
@@ -58,34 +61,70 @@ def stability(system: ParticleSystem, solver: Solver) -> Stability:
 
 
 def eigenvalues(system: ParticleSystem) -> NDArray[np.complex128]:
-    """Eigenvalues of d(deriv_eval)/dy now [1/s]: all of them, or those of largest size where there are many."""
+    """Eigenvalues of d(deriv_eval)/dy now [1/s], island by island.
+
+    All of them; where that is too much work, those of largest size, of largest frequency and of strongest damping.
+
+    Raises
+    ------
+    InvalidInput
+        The forces are not finite, or have no Jacobian, or the iteration does not converge.
+    """
     if not len(system.particles):
         return np.zeros(0, complex)
     matrix = system.jacobian(system.t, system.get_state())
     if not np.isfinite(matrix.data).all():
         raise InvalidInput("the forces are not finite where the particles are now: there is no largest step")
-    if (system.islands == np.arange(system.dim) % (system.dim // system.order) // 3).all():
-        return _each_particle(system, matrix)
-    if system.dim <= DENSE:
-        return np.linalg.eigvals(matrix.toarray()).astype(np.complex128)
-    from scipy.sparse.linalg import ArpackNoConvergence, eigs
-
-    start = np.cos(np.arange(system.dim))  # any fixed vector: the same answer each time
-    try:
-        values = eigs(matrix.astype(float), k=WANTED, which="LM", v0=start, return_eigenvectors=False)
-    except ArpackNoConvergence as error:
-        values = error.eigenvalues
-    return np.asarray(values, np.complex128)
+    islands = system.islands
+    sizes = np.bincount(islands).astype(float)
+    if sizes.max() <= DENSE and (sizes**3).sum() <= WORK * DENSE**3:
+        return _dense(matrix, islands)
+    return _extreme(matrix.astype(np.float64), system.inertia if system.order == 2 else None)
 
 
-def _each_particle(system: ParticleSystem, matrix: object) -> NDArray[np.complex128]:
-    """All particles are alone: one small block each."""
-    from scipy.sparse import coo_array
-
-    n, order = len(system.particles), system.order
-    entries = coo_array(matrix)
+def _dense(matrix: Any, islands: NDArray[np.intp]) -> NDArray[np.complex128]:
+    """All eigenvalues: one block for each island, islands of equal size at once."""
+    entries = matrix.tocoo()
     row, column = entries.coords
-    blocks = np.zeros((n, 3 * order, 3 * order))
-    place = 3 * (row // (3 * n)) + row % 3, 3 * (column // (3 * n)) + column % 3
-    blocks[row % (3 * n) // 3, place[0], place[1]] = entries.data
-    return np.unique(np.linalg.eigvals(blocks).ravel().round(12)).astype(np.complex128)
+    sizes = np.bincount(islands)
+    order = np.argsort(islands, kind="stable")
+    place = np.empty(len(islands), np.intp)  # of each entry within its island
+    place[order] = np.arange(len(islands)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    found = []
+    for size in np.unique(sizes):
+        number = np.cumsum(sizes == size) - 1
+        mine = sizes[islands[row]] == size
+        blocks = np.zeros((int((sizes == size).sum()), size, size))
+        blocks[number[islands[row[mine]]], place[row[mine]], place[column[mine]]] = entries.data[mine]
+        found.append(np.linalg.eigvals(np.unique(blocks, axis=0)).ravel())
+    return np.concatenate(found).astype(np.complex128)
+
+
+def _extreme(matrix: Any, inertia: NDArray[np.floating[Any]] | None) -> NDArray[np.complex128]:
+    """The eigenvalues that limit steps, by ARPACK's iterations from a fixed vector: the same answer each time.
+
+    Without damping, x'' = -K x with M K symmetric, the frequencies are roots of eigenvalues of a symmetric matrix.
+    """
+    from scipy.sparse import diags_array
+    from scipy.sparse.linalg import ArpackNoConvergence, eigs, eigsh
+
+    start = np.cos(np.arange(matrix.shape[0]))
+    if inertia is not None:
+        n = len(inertia)
+        pull, damping = matrix[n:, :n], matrix[n:, n:]
+        root = diags_array(np.sqrt(np.where(np.isfinite(inertia), inertia, 1.0)))
+        stiff = -(root @ pull @ diags_array(1 / root.diagonal()))
+        if not damping.count_nonzero() and abs(stiff - stiff.T).max() <= ACCURACY * abs(stiff).max():
+            squares = eigsh(stiff, k=WANTED, which="LA", v0=start[:n], tol=ACCURACY, return_eigenvectors=False)
+            return np.concatenate([sign * np.sqrt(squares.astype(complex)) for sign in (1j, -1j)])
+    found: list[NDArray[np.complex128]] = []
+    for which in ("LM", "LI", "SR"):
+        try:
+            values = eigs(matrix, WANTED, v0=start, return_eigenvectors=False, which=which, **ITERATION)
+        except ArpackNoConvergence as error:  # where all motions are of one kind, another kind is not found
+            values = error.eigenvalues
+        found.append(np.asarray(values, np.complex128))
+    extreme = np.concatenate(found)
+    if not len(extreme):
+        raise InvalidInput("the highest frequency of this system could not be found: try a smaller part of it")
+    return extreme

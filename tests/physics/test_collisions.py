@@ -85,9 +85,7 @@ def test_C04_incline_rests(name, slope):
 @pytest.mark.parametrize("slope", [0.05, 0.4, 2.0])
 def test_C04_incline_slides(name, slope):
     mu, angle = slope / 1.1, np.arctan(slope)
-    sim = drop(
-        SOLVERS[name](), 1 / 60, pm.Plane(normal=(-np.sin(angle), np.cos(angle), 0), friction=mu), x=(0, 0, 0)
-    )
+    sim = drop(SOLVERS[name](), 1 / 60, pm.Plane(normal=(-np.sin(angle), np.cos(angle), 0), friction=mu), x=(0, 0, 0))
     sim.step(60)
     downhill = -np.array([np.cos(angle), np.sin(angle), 0])
     a = G * (np.sin(angle) - mu * np.cos(angle))
@@ -150,9 +148,7 @@ def test_C10_coulomb_impact(mu, tangential):
 def test_leaves_a_sphere_at_two_thirds(solver):
     # From rest at the top of a smooth sphere: m v^2 / R = m g cos, v^2 = 2 g R (1 - cos), so cos = 2/3.
     angle, eps = 0.02, 1e-10  # once off, the gap grows as t^3 at first: 10 eps^(1/3) late
-    sim = drop(
-        solver, 1 / 500, pm.Sphere(friction=0, eps=eps), x=(np.sin(angle), np.cos(angle), 0), v=(0, 0, 0)
-    )
+    sim = drop(solver, 1 / 500, pm.Sphere(friction=0, eps=eps), x=(np.sin(angle), np.cos(angle), 0), v=(0, 0, 0))
     surface = sim.system.colliders[0]
     last = None
     while sim.t < 3 and surface.distance(sim.system.particles.x, sim.t)[0] <= eps:
@@ -213,9 +209,7 @@ def test_rests_in_a_groove():
 
 @pytest.mark.parametrize("name", ["euler", "rk4", "dopri5", "implicit_euler"])
 def test_a_flow_follows_a_wall(name):
-    system = pm.ParticleSystem(
-        pm.Particles([[0, 0.3, 0]]), [pm.Flow(velocity=(1.0, -1.0, 0.0))], [pm.Plane(eps=1e-4)]
-    )
+    system = pm.ParticleSystem(pm.Particles([[0, 0.3, 0]]), [pm.Flow(velocity=(1.0, -1.0, 0.0))], [pm.Plane(eps=1e-4)])
     sim = pm.Simulation(system, SOLVERS[name](), 1 / 60)
     sim.step(60)
     x = system.particles.x[0]

@@ -13,7 +13,10 @@ from pointmass.collisions.plane import Plane
 from pointmass.errors import InvalidInput, finite_array
 from pointmass.laws.parameter import Vector
 
-FACES = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]  # fmt: skip
+FACES = [  # two triangles for each face, counter-clockwise seen from outside
+    *([0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]),
+    *([2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]),
+]
 
 
 class Box(Collider):
@@ -53,7 +56,8 @@ class Box(Collider):
             nearest: Array = np.min(self.half - np.abs(x), axis=1)
             return nearest
         q: Array = np.abs(x) - self.half
-        return lengths(np.maximum(q, 0)) + np.minimum(q.max(axis=1), 0)
+        inside: Array = np.minimum(q.max(axis=1), 0)
+        return lengths(np.maximum(q, 0)) + inside
 
     def local_normal(self, x: Array) -> Array:
         q: Array = np.abs(x) - self.half

@@ -21,7 +21,8 @@ Contact = Literal["swept", "discrete"]
 class Collider(Described, ABC):
     """A surface that particles bounce off: V' = V_T - k_r V_N (lecture, "Collision Response").
 
-    Coulomb friction acts on V_T. The free side is where the signed distance is positive. Distances are computed in float64.
+    Coulomb friction acts on V_T. The free side is where the signed distance is positive. Distances are computed in
+    float64.
 
     Attributes
     ----------
@@ -64,7 +65,8 @@ class Collider(Described, ABC):
         """Gradient of the distance, unit vectors, shape (k, 3)."""
 
     def bending(self, x: Array, v: Array) -> Array:
-        """How fast the surface curves away under a velocity [m/s^2], shape (k,): v . H v, H the Hessian of the distance.
+        """How fast the surface curves away under a velocity [m/s^2], shape (k,): v . H v, H the Hessian of the
+        distance.
 
         `x` is relative to the place. 0 for flat surfaces.
         """

@@ -68,7 +68,8 @@ class Standing:
 class Contacts:
     """The filter on forces. It is set up before each piece of a step and stays the same during it.
 
-    With `lagged`, loads and whether friction holds are those of the start of the piece, and what stands then cannot lift off before the
+    With `lagged`, loads and whether friction holds are those of the start of the piece, and what stands then cannot
+    lift off before the
     next one: the filter is then linear, and Newton's method sees its exact Jacobian.
     """
 
@@ -106,7 +107,8 @@ class Contacts:
         shared = sum(len(s.rows) for s in self.standing) > len({r for s in self.standing for r in s.rows.tolist()})
         self._passes = PASSES if shared else 1
         for _ in range(self._passes if self.order == 2 else 0):
-            if not any([self._stop(stand, v, t) for stand in self.standing]):
+            moving = [self._stop(stand, v, t) for stand in self.standing]
+            if not any(moving):
                 break
         for stand in self.standing:
             self._choose_slide(stand, v, m, a, t)
@@ -115,7 +117,8 @@ class Contacts:
         """Take away what presses into the surfaces, and add friction (projected Gauss-Seidel over the contacts)."""
         looks = [self._look(stand, t, x, v, m) for stand in self.standing]
         for _ in range(self._passes):
-            if not any([self._bear(stand, *look, f) for stand, look in zip(self.standing, looks, strict=True)]):
+            changed = [self._bear(stand, *look, f) for stand, look in zip(self.standing, looks, strict=True)]
+            if not any(changed):
                 break
 
     def projection(self, n: int) -> Any:
@@ -137,7 +140,8 @@ class Contacts:
     def settle(self, x: Array, v: Array, t: Array, h: Array, radius: Array) -> None:
         """Bring those that stood back to their surface at the end of a piece; in place.
 
-        Who is held by friction goes where its place on the surface goes, whom friction stopped is where it came to rest, who is pressed on is
+        Who is held by friction goes where its place on the surface goes, whom friction stopped is where it came to
+        rest, who is pressed on is
         put back on the surface, and nobody is left inside.
 
         Parameters
@@ -147,12 +151,15 @@ class Contacts:
         for stand in self.standing:
             self._hold(stand, x, v, t, h)
         for _ in range(self._passes):
-            if not any([self._put_back(stand, x, v, t, h, radius) for stand in self.standing]):
+            moved = [self._put_back(stand, x, v, t, h, radius) for stand in self.standing]
+            if not any(moved):
                 break
 
     # ------------------------------------------------------------------------------------------------ at the start
 
-    def _stand(self, surface: Collider, rows: Rows, gap: Array, x: Array, v: Array, m: Array, a: Array, t: Array) -> None:
+    def _stand(
+        self, surface: Collider, rows: Rows, gap: Array, x: Array, v: Array, m: Array, a: Array, t: Array
+    ) -> None:
         """Add those of `rows` that stand."""
         now = t[rows]
         local = x[rows] - surface.at(now)
@@ -190,7 +197,8 @@ class Contacts:
         relative = v[rows] - motion
         relative -= rows_dot(relative, stand.normal)[:, None] * stand.normal
         speed = lengths(relative)
-        bounce = np.sqrt(2 * surface.eps * stand.load / m[rows])  # the speed that counts as resting, across the surface
+        bounce = np.sqrt(2 * surface.eps * stand.load / m[rows])  # the speed that counts as resting, across the
+        surface
         speed = np.where(speed > _roundoff(v[rows], motion) + STILL * np.finfo(v.dtype).eps * bounce, speed, 0)
         stand.speed, stand.slide = speed, directions(relative, speed, NONE)
         v[rows] = np.where((speed == 0)[:, None], motion, v[rows])

@@ -1,6 +1,7 @@
 """The reference engine: the solver's step, then what the colliders make of it, until every island has arrived.
 
-The solver makes its step. Each particle's path is cast against the colliders; at its first hit it responds. A particle that is
+The solver makes its step. Each particle's path is cast against the colliders; at its first hit it responds. A
+particle that is
 an island of its own is stepped again by its solver over what is left of the step; one that others pull on finishes
 the step ballistically with its new velocity.
 """
@@ -103,7 +104,8 @@ class ReferenceEngine:
         system.set_state(y, t1)
 
     def state_at(self, t: float) -> Array:
-        """State of the present particles at a time within the last step, shape (dim,): dense output; nothing is changed.
+        """State of the present particles at a time within the last step, shape (dim,): dense output; nothing is
+        changed.
 
         Particles that were born later are where they will be born.
         """
@@ -124,7 +126,8 @@ class ReferenceEngine:
         return state
 
     def _fit_memory(self) -> None:
-        """Carry what the solver remembers over births, deaths and new links: every particle and island keeps its own."""
+        """Carry what the solver remembers over births, deaths and new links: every particle and island keeps its
+        own."""
         system = self.system
         ids, islands = system.particles.id, system.island_of_particle
         if not self.memory or (self._ids is ids and self._islands is islands):
@@ -218,7 +221,9 @@ class ReferenceEngine:
         for k, surface in enumerate(self._swept):
             standing = self._contacts.on(surface)
             if len(standing):
-                look = np.flatnonzero(~np.isin(rows, standing))
+                free = np.ones(len(self._ids), bool)
+                free[standing] = False
+                look = np.flatnonzero(free[rows])
                 hit = np.full(len(rows), np.inf)
                 hit[look] = first_hit(surface, paths.take(look))
             else:
@@ -255,7 +260,8 @@ class ReferenceEngine:
     def _evict(self, x: Array, v: Array, t: Array, moved: Mask) -> None:
         """Put out those whom one surface, or the end of their patience, pushed into another one; in place.
 
-        Who began the step inside may stay as deep. Where surfaces leave no room at all, as in a closing press, somebody
+        Who began the step inside may stay as deep. Where surfaces leave no room at all, as in a closing press,
+        somebody
         stays inside.
         """
         radius = self.system.particles.radius

@@ -1,0 +1,136 @@
+"""Largest safe steps against eigenvalues that are known."""
+
+import time
+
+import numpy as np
+import pytest
+
+import pointmass as pm
+from pointmass.stability import eigenvalues
+
+
+def chain(n, k=50.0, m=0.2, k_d=0.0, drag=0.0):
+    x = np.stack([np.arange(n + 1.0), np.zeros(n + 1), np.zeros(n + 1)], axis=1)
+    p = pm.Particles(x, m=m)
+    p.pin([0])
+    forces = [pm.Springs(np.stack([np.arange(n), np.arange(1, n + 1)], axis=1), k_s=k, k_d=k_d)]
+    return pm.ParticleSystem(p, [*forces, pm.Drag(k=drag)] if drag else forces)
+
+
+def sheet(n, k=100.0, k_d=0.0):
+    i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+    x = np.stack([i.ravel(), j.ravel(), 0 * i.ravel()], axis=1).astype(float)
+    at = np.arange(n * n).reshape(n, n)
+    lines = [(at[1:], at[:-1]), (at[:, 1:], at[:, :-1])]
+    pairs = np.concatenate([np.stack([a.ravel(), b.ravel()], axis=1) for a, b in lines])
+    return pm.ParticleSystem(pm.Particles(x), [pm.Springs(pairs, k_s=k, k_d=k_d)])
+
+
+def test_nothing_limits_free_particles():
+    system = pm.ParticleSystem(pm.Particles(np.zeros((10_000, 3))), [pm.Gravity()], [pm.Plane()])
+    began = time.perf_counter()
+    report = system.stability(pm.Leapfrog())
+    assert time.perf_counter() - began < 10
+    assert report.largest_safe_dt == np.inf
+    assert (report.frequency, report.damping_ratio, report.period) == (0.0, 0.0, np.inf)
+
+
+def test_no_particles():
+    assert (
+        pm.ParticleSystem(pm.Particles(np.zeros((0, 3))), [pm.Gravity()]).stability(pm.RK4()).largest_safe_dt == np.inf
+    )
+
+
+@pytest.mark.parametrize(
+    ("solver", "y"), [(pm.SymplecticEuler(), 2.0), (pm.Leapfrog(), 2.0), (pm.RK4(), 8**0.5), (pm.Euler(), 0.0)]
+)
+def test_single_spring(solver, y):
+    system = chain(1)
+    omega = np.sqrt(50 / 0.2)
+    report = system.stability(solver)
+    assert report.frequency == pytest.approx(omega, rel=1e-9)
+    assert report.period == pytest.approx(2 * np.pi / omega, rel=1e-9)
+    assert report.largest_safe_dt == pytest.approx(y / omega, rel=1e-6)
+
+
+@pytest.mark.parametrize("solver", [pm.ImplicitEuler(), pm.ImplicitMidpoint(), pm.DormandPrince()])
+def test_nothing_limits_these(solver):
+    assert chain(3).stability(solver).largest_safe_dt == np.inf
+
+
+@pytest.mark.parametrize("n", [2, 7, 40])
+def test_chain(n):
+    # stretched along the axis only: omega^2 = eigenvalues of k/m tridiag(-1, 2, -1) with one end free
+    stiffness = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    stiffness[-1, -1] = 1
+    omega = np.sqrt(50 / 0.2 * np.linalg.eigvalsh(stiffness).max())
+    assert chain(n).stability(pm.SymplecticEuler()).largest_safe_dt == pytest.approx(2 / omega, rel=1e-6)
+
+
+def test_damped_spring():
+    # w h < 2 (sqrt(1 + zeta^2) - zeta)
+    omega = np.sqrt(50 / 0.2)
+    for zeta in (0.1, 0.5, 0.9):
+        report = chain(1, k_d=2 * zeta * omega * 0.2).stability(pm.SymplecticEuler())
+        assert report.damping_ratio == pytest.approx(zeta, rel=1e-9)
+        assert report.largest_safe_dt * omega == pytest.approx(2 * (np.sqrt(1 + zeta**2) - zeta), rel=1e-6)
+
+
+def test_drag_alone():
+    system = pm.ParticleSystem(pm.Particles([[0, 0, 0], [1, 0, 0]], m=[1.0, 0.5]), [pm.Drag(k=4.0)])
+    assert system.stability(pm.Euler()).largest_safe_dt == pytest.approx(2 * 0.5 / 4, rel=1e-6)
+    assert system.stability(pm.RK4()).largest_safe_dt == pytest.approx(2.785293563 * 0.5 / 4, rel=1e-6)
+
+
+@pytest.mark.parametrize("solver", [pm.Leapfrog(), pm.RK4(), pm.SymplecticEuler()])
+@pytest.mark.parametrize("drag", [1.0, 60.0, 400.0])
+def test_the_limit_holds_where_drag_and_springs_mix(solver, drag):
+    # Strong drag on some and stiff springs on others: whatever limits, a run just below it stays bounded. It is exact but
+    # for splitting methods under strong drag, where it is a lower bound (see `largest_safe_step`).
+    p = pm.Particles([[0, 0, 0], [1, 0, 0], [5, 0, 0]], m=1.0)
+    p.pin([0])
+    system = pm.ParticleSystem(p, [pm.Springs([(0, 1)], k_s=1e4, k_d=2.0), pm.Drag(k=drag, on=[2])])
+    limit = system.stability(solver).largest_safe_dt
+    p.x[1], p.v[2] = [1.01, 0, 0], [0.01, 0, 0]
+    exact = solver.name == "rk4" or drag == 1
+    for factor, bounded in ((0.98, True), (1.1 if exact else 3.5, False)):
+        y = system.get_state()
+        with np.errstate(all="ignore"):
+            for _ in range(600):
+                y = solver.step(system, 0.0, y, factor * limit, {}).y1
+            assert (np.abs(y - system.get_state()).max() < 1) == bounded
+
+
+def test_pinned_and_standing_particles():
+    system = chain(3)
+    system.particles.pin([0, 1, 2, 3])
+    assert system.stability(pm.Leapfrog()).largest_safe_dt == np.inf
+    floor = pm.ParticleSystem(pm.Particles([[0, 0, 0]]), [pm.Gravity(), pm.Drag(k=1.0)], [pm.Plane()])
+    assert floor.stability(pm.Euler()).largest_safe_dt == pytest.approx(2.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("k_d", [0.0, 0.5])
+def test_large_sheets_are_solved_fast_and_the_same_each_time(k_d):
+    system = sheet(29, k_d=k_d)  # 5046 numbers
+    began = time.perf_counter()
+    one = system.stability(pm.SymplecticEuler()).largest_safe_dt
+    assert time.perf_counter() - began < 60
+    assert one == system.stability(pm.SymplecticEuler()).largest_safe_dt
+    # rows of springs at rest do not feel each other: each is a free chain of 29
+    omega = 2 * np.sqrt(100.0) * np.cos(np.pi / (2 * 29))
+    zeta = k_d * omega / 200
+    assert one == pytest.approx(2 * (np.sqrt(1 + zeta**2) - zeta) / omega, rel=1e-4)
+
+
+def test_islands_are_solved_on_their_own():
+    x = np.arange(60.0)[:, None] * [1, 0, 0]
+    pairs = [(3 * i, 3 * i + 1) for i in range(20)]
+    system = pm.ParticleSystem(pm.Particles(x), [pm.Springs(pairs, k_s=np.linspace(1, 20, 20))])
+    frequencies = np.unique(np.abs(eigenvalues(system).imag).round(6))
+    np.testing.assert_allclose(frequencies[1:], np.sqrt(2 * np.linspace(1, 20, 20)), rtol=1e-6)
+
+
+def test_forces_that_are_not_finite():
+    system = pm.ParticleSystem(pm.Particles(np.zeros((2, 3))), [pm.Gravitation()])
+    with pytest.raises(pm.InvalidInput, match="not finite"):
+        system.stability(pm.Leapfrog())
