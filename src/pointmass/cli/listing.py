@@ -25,10 +25,16 @@ def command(as_json: bool) -> None:
 def _print_tables(scenes: list[dict[str, Any]]) -> None:
     from rich.console import Console
 
+    console = Console(width=None if sys.stdout.isatty() else 110, highlight=False)
+    with console.capture() as capture:
+        _print_all(console, scenes)
+    click.echo(capture.get(), nl=False)
+
+
+def _print_all(console: Any, scenes: list[dict[str, Any]]) -> None:
     from pointmass.forces import FORCES
     from pointmass.solvers import ALIASES, SOLVERS
 
-    console = Console(width=None if sys.stdout.isatty() else 110, highlight=False)
     console.print("[bold]Scenes[/], with the parameters that --set changes")
     for scene in scenes:
         _print_scene(console, scene)

@@ -43,32 +43,41 @@ class Commands(click.Group):
         command: click.Command = import_module(f"pointmass.cli.{COMMANDS[cmd_name]}").command
         return command
 
-    def main(self, args: Sequence[str] | None = None, *_: Any, **options: Any) -> NoReturn:
+    def invoke(self, ctx: click.Context) -> Any:
         try:
-            options.pop("standalone_mode", None)
-            code = super().main(args, "pointmass", standalone_mode=False, **options)
+            return super().invoke(ctx)
         except BrokenPipeError:  # the reader, such as head, has seen enough
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            code = DONE
-        except (click.ClickException, PointmassError, KeyboardInterrupt, click.Abort, MemoryError, OSError) as error:
-            code, sentence = ending(error)
-            click.echo(f"pointmass: {sentence}", err=True)
+            ctx.exit(DONE)
+        except (PointmassError, KeyboardInterrupt, MemoryError, OSError) as error:
+            raise Ended(*ending(error)) from error
+
+    def main(self, args: Sequence[str] | None = None, *_: Any, **options: Any) -> NoReturn:
+        try:
+            code = super().main(args, "pointmass", standalone_mode=False)
+        except click.ClickException as error:
+            code = error.code if isinstance(error, Ended) else BAD_INPUT
+            click.echo(f"pointmass: {' '.join(error.format_message().split())}", err=True)
         sys.exit(code if isinstance(code, int) else DONE)
+
+
+class Ended(click.ClickException):
+    """The end of a command that did not do all that was asked of it."""
+
+    def __init__(self, code: int, sentence: str) -> None:
+        super().__init__(sentence)
+        self.code = code
 
 
 def ending(error: BaseException) -> tuple[int, str]:
     """Exit code and sentence for what stopped a command."""
     if isinstance(error, Diverged):
         return DIVERGED, str(error)
-    if isinstance(error, Interrupted):
-        return INTERRUPTED, str(error)
-    if isinstance(error, (KeyboardInterrupt, click.Abort)):
-        return INTERRUPTED, "interrupted"
+    if isinstance(error, KeyboardInterrupt):
+        return INTERRUPTED, str(error) or "interrupted"
     if isinstance(error, MemoryError):
         return BAD_INPUT, f"there is not enough memory: {error or 'take fewer particles or a smaller picture'}"
-    if isinstance(error, click.ClickException):
-        return BAD_INPUT, " ".join(error.format_message().split())
-    return BAD_INPUT, " ".join(str(error).split())
+    return BAD_INPUT, str(error)
 
 
 @click.group(

@@ -1,0 +1,434 @@
+"""The command line: what it prints and writes, and one sentence for everything that it refuses."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+import pointmass as pm
+from pointmass.cache import Cache
+from pointmass.cli import main
+from pointmass.scenes import SCENES
+
+SMALL = ["--size", "64x48", "--quiet"]
+SCENE = """
+dt = 0.01
+frames = 4
+solver = "rk4"
+[[bodies]]
+type = "points"
+x = [[0.0, 1.0, 0.0], [0.5, 1.0, 0.0]]
+radius = 0.1
+[[forces]]
+type = "gravity"
+[[forces]]
+type = "drag"
+k = 0.1
+[[colliders]]
+type = "plane"
+"""
+BURSTING = """
+name = "bursting"
+dt = 0.01
+frames = 200
+solver = "euler"
+[[bodies]]
+type = "points"
+x = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+[[forces]]
+type = "springs"
+pairs = [[0, 1]]
+k_s = 1e5
+rest = 0.9
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.toml").write_text(SCENE)
+    (tmp_path / "bursting.toml").write_text(BURSTING)
+    return tmp_path
+
+
+def pointmass(*arguments: str) -> Result:
+    return CliRunner().invoke(main, list(arguments), catch_exceptions=False)
+
+
+def contents(folder: Path) -> dict[str, bytes | None]:
+    return {str(p.relative_to(folder)): p.read_bytes() if p.is_file() else None for p in folder.rglob("*")}
+
+
+# ---------------------------------------------------------------------------------------------------------------- list
+
+
+def test_list_as_json_holds_every_scene() -> None:
+    done = pointmass("list", "--json")
+    assert done.exit_code == 0
+    scenes = json.loads(done.stdout)["scenes"]
+    assert [s["name"] for s in scenes] == list(SCENES)
+    for scene in scenes:
+        assert scene["summary"]
+        for parameter in scene["parameters"]:
+            assert {"name", "default", "unit", "minimum", "maximum", "choices", "summary"} <= set(parameter)
+
+
+def test_list_for_people_names_everything() -> None:
+    done = pointmass("list")
+    text = " ".join(done.stdout.split())
+    for name in (*SCENES, *pm.SOLVERS, *pm.FORCES, "links", "N/m", "velocity_verlet"):
+        assert name in text
+
+
+def test_help_and_version() -> None:
+    assert pm.__version__ in pointmass("--version").stdout
+    for arguments in ([], ["-h"], ["--help"]):
+        assert "SCENE is the name of a scene" in pointmass(*arguments).stdout
+    for command in ("list", "run", "render", "check", "export", "new"):
+        assert "-h, --help" in pointmass(command, "-h").stdout
+
+
+# ----------------------------------------------------------------------------------------------------------------- run
+
+
+def test_run_writes_a_cache(folder: Path) -> None:
+    done = pointmass("run", "a.toml", "-o", "b.zarr", "--frames", "3", "--json")
+    assert (done.exit_code, done.stderr) == (0, "")
+    result = json.loads(done.stdout)
+    assert result.pop("seconds") >= 0
+    assert result == {"command": "run", "path": "b.zarr", "frames": 3, "diverged": None, "interrupted": False}
+    assert len(Cache.open("b.zarr")) == 3
+
+
+def test_the_default_output_is_said_on_stderr(folder: Path) -> None:
+    done = pointmass("run", "a.toml")
+    assert done.exit_code == 0
+    assert done.stdout == ""
+    assert re.fullmatch(r"pointmass: 4 frames in [\d.]+ s: a.zarr\n", done.stderr)
+    assert len(Cache.open("a.zarr")) == 4
+    assert pointmass("run", "pendulum", "--frames", "2", "-q").stderr == ""
+    assert len(Cache.open("pendulum.zarr")) == 2
+
+
+def test_options_reach_the_run(folder: Path) -> None:
+    run = ["run", "a.toml", "-o", "b.zarr", "--frames", "3", "--fps", "30", "--substeps", "5", "--solver", "verlet"]
+    settings = ["--set", "forces.1.k=0.3", "--set", "look.color=red"]
+    done = pointmass(*run, "--seed", "7", "--dtype", "float32", "--threads", "1", *settings)
+    assert done.exit_code == 0
+    cache = Cache.open("b.zarr")
+    scene = cache.scene
+    assert scene is not None
+    assert (scene.frames, scene.fps, scene.dt, scene.seed, scene.dtype) == (3, 30.0, 1 / 150, 7, "float32")
+    assert (scene.forces[1].arguments["k"], scene.look.color) == (0.3, "red")
+    assert (cache.fps, cache.attributes["solver"], cache.attributes["seed"]) == (30.0, "leapfrog", 7)
+    assert cache[2].positions.dtype == np.float32
+    assert pointmass("run", "a.toml", "-o", "c.zarr", "--dt", "0.004").exit_code == 0
+    assert Cache.open("c.zarr").attributes["dt"] == 0.004
+
+
+def test_parameters_of_shipped_scenes_are_set(folder: Path) -> None:
+    done = pointmass("run", "pendulum", "--frames", "2", "--set", "links=3", "--set", "length=2", "-o", "p.zarr")
+    assert done.exit_code == 0
+    assert len(Cache.open("p.zarr")[0].ids) == 4
+
+
+def test_a_second_run_replaces_the_first_with_the_same_bits(folder: Path) -> None:
+    pointmass("run", "a.toml", "-o", "b.zarr", "--frames", "2")
+    pointmass("run", "a.toml", "-o", "b.zarr", "--set", "seed=1")
+    pointmass("run", "a.toml", "-o", "c.zarr", "--set", "seed=1")
+    first, second = Cache.open("b.zarr"), Cache.open("c.zarr")
+    assert len(first) == 4
+    for a, b in zip(first, second, strict=True):
+        assert a.positions.tobytes() == b.positions.tobytes()
+
+
+def test_a_divergence_keeps_the_frames_before_it(folder: Path) -> None:
+    done = pointmass("run", "bursting.toml", "-o", "d.zarr", "--json")
+    assert done.exit_code == 3
+    assert re.fullmatch(
+        r"pointmass: diverged in step \d+ .* at particle .*; \d+ frames kept in 'd.zarr'\n", done.stderr
+    )
+    result = json.loads(done.stdout)
+    assert 0 < result["frames"] < 200
+    assert result["diverged"]["step"] > 0
+    assert len(Cache.open("d.zarr")) == result["frames"]
+
+
+# -------------------------------------------------------------------------------------------------------------- render
+
+
+@pytest.mark.parametrize("name", ["f.mp4", "f.gif", "f.webm", "f.png"])
+def test_render_writes_films_and_pictures(folder: Path, name: str) -> None:
+    done = pointmass("render", "a.toml", "-o", name, *SMALL)
+    assert done.exit_code == 0
+    assert (folder / name).stat().st_size > 100
+    assert sorted(p.name for p in folder.iterdir()) == sorted(["a.toml", "bursting.toml", name])
+
+
+def test_render_of_a_cache_is_the_render_of_its_scene(folder: Path) -> None:
+    pointmass("run", "a.toml")
+    for source, name in (("a.toml", "x_%04d.png"), ("a.zarr", "y_%04d.png")):
+        assert pointmass("render", source, "-o", name, *SMALL).exit_code == 0
+    for k in range(4):
+        assert (folder / f"x_{k:04d}.png").read_bytes() == (folder / f"y_{k:04d}.png").read_bytes()
+    assert pointmass("render", "a.zarr", "-o", "last.png", *SMALL).exit_code == 0
+    assert pointmass("render", "a.zarr", "-o", "two.png", "--frame", "2", *SMALL).exit_code == 0
+    assert (folder / "last.png").read_bytes() == (folder / "y_0003.png").read_bytes()
+    assert (folder / "two.png").read_bytes() == (folder / "y_0002.png").read_bytes()
+
+
+def test_render_options_change_the_picture(folder: Path) -> None:
+    pointmass("run", "a.toml")
+    seen = set()
+    for options in ([], ["--caption"], ["--azimuth", "90"], ["--elevation", "60"], ["--fov", "60"]):
+        done = pointmass("render", "a.zarr", "-o", "x.png", "--json", *SMALL, *options)
+        assert json.loads(done.stdout)["frames"] == 1
+        seen.add((folder / "x.png").read_bytes())
+    assert len(seen) == 5
+
+
+def test_render_of_one_frame_simulates_no_further(folder: Path) -> None:
+    done = pointmass("render", "bursting.toml", "-o", "x.png", "--frame", "1", *SMALL)
+    assert done.exit_code == 0
+    assert (folder / "x.png").exists()
+
+
+def test_render_of_a_divergence_holds_what_came_before(folder: Path) -> None:
+    done = pointmass("render", "bursting.toml", "-o", "d.gif", "--size", "32x24", "--json")
+    assert done.exit_code == 3
+    assert "diverged in step" in done.stderr
+    assert "holds the" in done.stderr
+    assert json.loads(done.stdout)["frames"] > 0
+    assert sorted(p.name for p in folder.iterdir()) == ["a.toml", "bursting.toml", "d.gif"]
+    late = pointmass("render", "bursting.toml", "-o", "x.png", "--frame", "199", *SMALL)
+    assert late.exit_code == 3
+    assert "'x.png' was not written" in late.stderr
+    assert not (folder / "x.png").exists()
+
+
+# --------------------------------------------------------------------------------------------------- export, check, new
+
+
+def test_export_writes_arrays(folder: Path) -> None:
+    pointmass("run", "a.toml")
+    assert pointmass("export", "a.zarr", "-o", "a.npz").exit_code == 0
+    with np.load("a.npz") as data:
+        assert data["positions"].tobytes() == np.stack([f.positions for f in Cache.open("a.zarr")]).tobytes()
+
+
+def test_check_says_what_is_safe(folder: Path) -> None:
+    result = json.loads(pointmass("check", "pendulum", "--json").stdout)
+    assert set(result) == {
+        "scene", "solver", "dt", "largest_safe_dt", "frequency", "damping_ratio", "period", "safe",
+        "particles", "springs", "forces",
+    }  # fmt: skip
+    assert result["safe"] is True
+    assert (result["particles"], result["springs"], result["solver"]) == (13, 12, "leapfrog")
+    assert result["largest_safe_dt"] > result["dt"]
+    unsafe = pointmass("check", "pendulum", "--dt", "0.01")
+    assert unsafe.exit_code == 0
+    found = re.search(r"verdict\s+not safe: use --dt ([\d.e-]+) or --substeps (\d+)", unsafe.stdout)
+    assert found
+    for advice in (["--dt", found[1]], ["--substeps", found[2]], ["--solver", "implicit_euler", "--dt", "0.01"]):
+        assert json.loads(pointmass("check", "pendulum", "--json", *advice).stdout)["safe"] is True
+    free = json.loads(pointmass("check", "a.toml", "--set", "forces.1.k=0", "--json").stdout)
+    assert (free["largest_safe_dt"], free["period"], free["frequency"], free["safe"]) == (None, None, 0.0, True)
+    assert "amplifies this motion at any dt" in pointmass("check", "orbit", "--solver", "euler").stdout
+
+
+def test_new_writes_a_scene_that_runs(folder: Path) -> None:
+    assert pointmass("new").exit_code == 0
+    assert pointmass("new", "mine.toml").exit_code == 0
+    text = (folder / "mine.toml").read_text()
+    scene = pm.Scene.from_toml(text)
+    assert set(tomllib.loads(text)) >= {"bodies", "forces", "colliders", "camera", "look", "solver"}
+    assert {force.name for force in scene.forces} >= {"gravity", "field"}
+    headers = [line for line in text.splitlines() if line.startswith("[[")]
+    assert all("#" in text.split(header)[0][-400:] for header in headers)
+    assert json.loads(pointmass("check", "mine.toml", "--json").stdout)["safe"] is True
+    assert pointmass("render", "mine.toml", "-o", "m.png", "--frames", "20", *SMALL).exit_code == 0
+    again = pointmass("new", "mine.toml")
+    assert (again.exit_code, again.stderr) == (2, "pointmass: 'mine.toml' is there already: give another name\n")
+    assert (folder / "mine.toml").read_text() == text
+
+
+# ----------------------------------------------------------------------------------------------------------- bad input
+
+LINE = "\n[[forces]]\n"
+BAD_FILES = {
+    "key": SCENE + "colour = 1\n",
+    "solver": SCENE.replace("rk4", "rk5"),
+    "force": SCENE.replace("drag", "dragg"),
+    "mass": SCENE.replace("radius = 0.1", "m = -1.0"),
+    "dt": SCENE.replace("dt = 0.01", "dt = 0.0"),
+    "nan": SCENE.replace("k = 0.1", "k = nan"),
+    "nan in a list": SCENE.replace("0.5, 1.0", "nan, 1.0"),
+    "nan in the camera": SCENE + "[camera]\nazimuth = nan\n",
+    "restitution": SCENE + "restitution = 1.2\n",
+    "self spring": SCENE + LINE + 'type = "springs"\npairs = [[1, 1]]\n',
+    "missing particle": SCENE + LINE + 'type = "springs"\npairs = [[0, 9]]\n',
+    "formula": SCENE + LINE + 'type = "field"\nforce = ["__import__(\'os\')", "0", "0"]\n',
+    "attribute": SCENE + LINE + 'type = "field"\nforce = ["x.__class__", "0", "0"]\n',
+    "unknown name": SCENE + LINE + 'type = "field"\nforce = ["chrge*x", "0", "0"]\n',
+    "no grid": SCENE + LINE + 'type = "field"\ngrid = "none.npz"\n',
+    "cut grid": SCENE + LINE + 'type = "field"\ngrid = "cut.npz"\n',
+    "wrong grid": SCENE + LINE + 'type = "field"\ngrid = "wrong.npz"\n',
+    "color": SCENE + '[look]\ncolor = "blau"\n',
+    "color by": SCENE + '[look]\ncolor_by = "heat"\n',
+    "not TOML": "frames = = 3",
+    "empty": "",
+    "binary": "\udcff\udcfe",
+    "too many": 'dt = 0.1\n[[bodies]]\ntype = "scatter"\ncount = 1000000000000000\n',
+    "solver of a flow": 'solver = "leapfrog"\n[[bodies]]\ntype = "scatter"\ncount = 3\n' + LINE + 'type = "vortex"\n',
+}
+BAD_OPTIONS: list[tuple[str, list[str], str]] = [
+    ("--frames", ["--frames", "0"], "frames = 0 is not allowed"),
+    ("--frames text", ["--frames", "x"], "'--frames'"),
+    ("--fps", ["--fps", "-1"], "fps = -1.0 is not allowed"),
+    ("--dt", ["--dt", "0"], "dt = 0.0 is not allowed"),
+    ("--dt nan", ["--dt", "nan"], "dt = nan is not allowed"),
+    ("--substeps", ["--substeps", "0"], "substeps = 0 is not allowed"),
+    ("both", ["--dt", "0.01", "--substeps", "4"], "--dt and --substeps both set the step"),
+    ("--solver", ["--solver", "rk5"], "unknown solver 'rk5': did you mean 'rk4'"),
+    ("--seed", ["--seed", "-3"], "seed = -3 is not allowed"),
+    ("--dtype", ["--dtype", "float16"], "dtype = 'float16' is not allowed"),
+    ("--threads", ["--threads", "0"], "threads = 0 is not allowed"),
+    ("--set", ["--set", "k"], "--set 'k' is not allowed: write name=value"),
+    ("--set name", ["--set", "=3"], "--set '=3' is not allowed"),
+    ("--set path", ["--set", "forces.9.k=3"], "the scene has no 'forces.9.k'"),
+    ("--set nan", ["--set", "forces.1.k=nan"], "nan is not allowed"),
+    ("--set value", ["--set", "forces.1.k=-1"], "k = -1 is not allowed"),
+    ("unknown", ["--frmes", "3"], "--frmes"),
+]
+BAD_RENDERS: list[tuple[str, list[str], str]] = [
+    ("suffix", ["-o", "x.mov"], "unknown kind of picture or film '.mov'"),
+    ("no suffix", ["-o", "x"], "unknown kind of picture or film ''"),
+    ("folder", ["-o", "none/x.mp4"], "there is no folder 'none'"),
+    ("is folder", ["-o", "folder.mp4"], "it is a folder"),
+    ("--frame", ["-o", "x.png", "--frame", "4"], "--frame 4 is not allowed: there are 4 frames, counted from 0"),
+    ("--frame negative", ["-o", "x.png", "--frame", "-1"], "--frame -1 is not allowed"),
+    ("--frame film", ["-o", "x.mp4", "--frame", "1"], "--frame belongs to a single picture"),
+    ("--size", ["-o", "x.mp4", "--size", "large"], "--size 'large' is not allowed"),
+    ("--size 0", ["-o", "x.mp4", "--size", "0x100"], "size"),
+    ("--size huge", ["-o", "x.mp4", "--size", "999999x999999"], "size"),
+    ("--azimuth", ["-o", "x.mp4", "--azimuth", "nan"], "azimuth = nan is not allowed"),
+    ("--fov", ["-o", "x.mp4", "--fov", "180"], "fov = 180.0 is not allowed"),
+    ("fps", ["-o", "x.mp4", "--fps", "5000"], "fps = 5000.0 is not allowed"),
+]
+
+
+@pytest.fixture
+def old_files(folder: Path) -> Path:
+    np.savez(folder / "whole.npz", values=np.ones((2, 2, 2, 3)), origin=np.zeros(3), spacing=np.ones(3))
+    (folder / "cut.npz").write_bytes((folder / "whole.npz").read_bytes()[:300])
+    np.savez(folder / "wrong.npz", something=np.ones(3))
+    pointmass("run", "a.toml", "-o", "old.zarr", "--frames", "2")
+    (folder / "folder.mp4").mkdir()
+    (folder / "old.mp4").write_text("old film")
+    return folder
+
+
+def assert_refused(folder: Path, arguments: list[str], sentence: str = "") -> None:
+    before = contents(folder)
+    done = pointmass(*arguments)
+    assert done.exit_code == 2, done.output
+    assert done.stdout == ""
+    assert re.fullmatch(r"pointmass: [^\n]+\n", done.stderr), done.stderr
+    assert sentence in done.stderr
+    assert contents(folder) == before
+
+
+@pytest.mark.parametrize("what", BAD_FILES)
+def test_bad_files(old_files: Path, what: str) -> None:
+    (old_files / "bad.toml").write_bytes(BAD_FILES[what].encode(errors="surrogateescape"))
+    assert_refused(old_files, ["run", "bad.toml", "-o", "old.zarr"])
+    assert_refused(old_files, ["render", "bad.toml", "-o", "old.mp4"])
+    if not what.startswith(("color by", "solver of")):
+        assert_refused(old_files, ["check", "bad.toml"])
+
+
+@pytest.mark.parametrize(("arguments", "sentence"), [b[1:] for b in BAD_OPTIONS], ids=[b[0] for b in BAD_OPTIONS])
+def test_bad_options(old_files: Path, arguments: list[str], sentence: str) -> None:
+    for command in (["run", "a.toml", "-o", "old.zarr"], ["render", "a.toml", "-o", "old.mp4"], ["check", "a.toml"]):
+        assert_refused(old_files, [*command, *arguments], sentence)
+
+
+@pytest.mark.parametrize(("arguments", "sentence"), [b[1:] for b in BAD_RENDERS], ids=[b[0] for b in BAD_RENDERS])
+def test_bad_renders(old_files: Path, arguments: list[str], sentence: str) -> None:
+    assert_refused(old_files, ["render", "a.toml", *arguments], sentence)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["rnu", "pendulum"], "No such command"),
+        (["run"], "Missing argument"),
+        (["run", "pendlum"], "unknown scene 'pendlum': did you mean 'pendulum'"),
+        (["run", "none.toml"], "cannot read the scene 'none.toml': No such file"),
+        (["run", "folder.mp4"], "'folder.mp4' is a folder, not a scene"),
+        (["run", "old.zarr"], "is a folder, not a scene"),
+        (["run", "pendulum", "--set", "linsk=3"], "unknown parameter of scene pendulum: 'linsk': did you mean 'links'"),
+        (["run", "pendulum", "--set", "links=0"], "links = 0 is not allowed"),
+        (["run", "pendulum", "--set", "length=nan"], "length = nan is not allowed"),
+        (["run", "a.toml", "-o", "none/x.zarr"], "there is no folder 'none'"),
+        (["run", "a.toml", "-o", "a.toml"], "something else is there"),
+        (["run", "a.toml", "-o", "folder.mp4"], "something else is there"),
+        (["run", "a.toml", "-o", "old.mp4/x.zarr"], "there is no folder"),
+        (["render", "folder.mp4", "-o", "x.mp4"], "is not a pointmass cache"),
+        (["render", "old.zarr", "-o", "x.mp4", "--dt", "0.1"], "--dt cannot change the cache"),
+        (["render", "old.zarr", "-o", "x.mp4", "--set", "a=1"], "--set cannot change the cache"),
+        (["render", "old.zarr", "-o", "x.png", "--frame", "2"], "there are 2 frames"),
+        (["export", "old.zarr"], "Missing option '-o'"),
+        (["export", "old.zarr", "-o", "x.csv"], "unknown kind of export '.csv'"),
+        (["export", "old.zarr", "-o", "none/x.npz"], "there is no folder"),
+        (["export", "none.zarr", "-o", "x.npz"], "there is no such folder"),
+        (["export", "folder.mp4", "-o", "x.npz"], "is not a pointmass cache"),
+        (["check", "pendlum"], "unknown scene"),
+        (["new", "scene.txt"], "ends in .toml"),
+        (["new", "none/scene.toml"], "cannot write 'none/scene.toml'"),
+    ],
+)
+def test_bad_commands(old_files: Path, arguments: list[str], sentence: str) -> None:
+    assert_refused(old_files, arguments, sentence)
+
+
+def test_a_damaged_cache_is_refused(old_files: Path) -> None:
+    (old_files / "old.zarr/frames/000001/positions/c.0.0").write_bytes(b"junk")
+    assert_refused(old_files, ["render", "old.zarr", "-o", "old.mp4"], "frame 1 of the cache 'old.zarr' cannot be read")
+    assert_refused(old_files, ["export", "old.zarr", "-o", "x.npz"], "frame 1 of the cache")
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="nothing is read-only for root")
+def test_a_read_only_folder_is_refused(old_files: Path) -> None:
+    (old_files / "closed").mkdir(mode=0o500)
+    for arguments in (["run", "a.toml", "-o", "closed/x.zarr"], ["render", "a.toml", "-o", "closed/x.mp4"]):
+        assert_refused(old_files, arguments, "cannot write into folder 'closed'")
+
+
+@pytest.mark.parametrize("command", [["run", "a.toml", "-o", "i.zarr"], ["render", "a.toml", "-o", "i.mp4", *SMALL]])
+def test_an_interrupt_ends_with_130(folder: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]) -> None:
+    frame: Callable[..., Any] = pm.Simulation.frame
+
+    def interrupted(self: Any, number: int = 0, *rest: Any) -> Any:
+        if number == 2:
+            raise KeyboardInterrupt
+        return frame(self, number, *rest)
+
+    monkeypatch.setattr(pm.Simulation, "frame", interrupted)
+    done = pointmass(*command)
+    assert done.exit_code == 130
+    if command[0] == "run":
+        assert done.stderr == "pointmass: interrupted: 2 frames kept in 'i.zarr'\n"
+        assert len(Cache.open("i.zarr")) == 2
+    else:
+        assert done.stderr == "pointmass: interrupted: 'i.mp4' was not written\n"
+        assert sorted(p.name for p in folder.iterdir()) == ["a.toml", "bursting.toml"]

@@ -1,0 +1,102 @@
+"""The command as a process: kills, interrupts, threads, pipes."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from pointmass.cache import Cache
+
+COMMAND = [sys.executable, "-m", "pointmass.cli"]
+
+
+def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [*COMMAND, *arguments], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def wait_for_frames(cache: Path, count: int) -> None:
+    deadline = time.monotonic() + 60
+    while not (cache / "frames" / f"{count - 1:06d}").is_dir():
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+
+
+def kill_a_run(folder: Path, chance: random.Random) -> None:
+    process = start(folder, "run", "pendulum", "-o", "k.zarr", "--frames", "100000", "--set", "links=2")
+    wait_for_frames(folder / "k.zarr", chance.randrange(1, 6))
+    time.sleep(chance.uniform(0, 0.05))
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    cache = Cache.open(folder / "k.zarr")
+    assert len(cache) >= 1
+    for k, frame in enumerate(cache):
+        assert frame.number == k
+        assert frame.drawables
+
+
+def test_a_killed_run_leaves_a_whole_cache(tmp_path: Path) -> None:
+    for attempt in range(3):
+        (tmp_path / str(attempt)).mkdir()
+        kill_a_run(tmp_path / str(attempt), random.Random(attempt))
+
+
+@pytest.mark.full
+def test_two_hundred_killed_runs_leave_whole_caches(tmp_path: Path) -> None:
+    for attempt in range(200):
+        (tmp_path / str(attempt)).mkdir()
+        kill_a_run(tmp_path / str(attempt), random.Random(1000 + attempt))
+
+
+def test_control_c_keeps_the_frames_and_says_so(tmp_path: Path) -> None:
+    process = start(tmp_path, "run", "pendulum", "-o", "c.zarr", "--frames", "100000")
+    wait_for_frames(tmp_path / "c.zarr", 3)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=30)
+    frames = len(Cache.open(tmp_path / "c.zarr"))
+    assert (process.returncode, out) == (130, "")
+    assert err == f"pointmass: interrupted: {frames} frames kept in 'c.zarr'\n"
+
+
+def test_threads_change_no_bits(tmp_path: Path) -> None:
+    for name, threads, extra in (("a", "1", {}), ("b", "3", {}), ("c", "", {"POINTMASS_THREADS": "2"})):
+        option = ["--threads", threads] if threads else []
+        for command in (
+            ["run", "springs", "-o", f"{name}.zarr"],
+            ["render", "springs", "-o", f"{name}.png", "--size", "64x48"],
+        ):
+            arguments = [*command, "--frames", "2", "--set", "side=3", "--quiet", *option]
+            done = subprocess.run(
+                [*COMMAND, *arguments], cwd=tmp_path, env={**os.environ, **extra}, check=True, capture_output=True
+            )
+            assert done.stderr == b""
+    first = Cache.open(tmp_path / "a.zarr")
+    for name in "bc":
+        assert Cache.open(tmp_path / f"{name}.zarr")[1].positions.tobytes() == first[1].positions.tobytes()
+        assert (tmp_path / f"{name}.png").read_bytes() == (tmp_path / "a.png").read_bytes()
+
+
+def test_a_reader_that_stops_early_is_no_error(tmp_path: Path) -> None:
+    process = start(tmp_path, "list")
+    assert process.stdout is not None
+    process.stdout.close()
+    assert process.stderr is not None
+    assert process.stderr.read() == ""
+    assert process.wait() == 0
+
+
+def test_the_script_is_installed() -> None:
+    script = Path(sys.executable).with_name("pointmass")
+    if not script.exists():
+        pytest.skip("pointmass is not installed into this environment")
+    done = subprocess.run([script, "run", "pendlum"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("pointmass: unknown scene 'pendlum': did you mean 'pendulum'?")
