@@ -15,6 +15,7 @@ from pointmass.laws.elements import ConstraintForce
 from pointmass.laws.force import Blocks, Force
 from pointmass.particles import Array, Particles, Selection
 from pointmass.solvers.base import Solver
+from pointmass.solvers.registry import as_solver
 from pointmass.stability import Stability, stability
 
 
@@ -243,9 +244,9 @@ class ParticleSystem:
                 worst = max(worst, float(relative.max(initial=0.0)))
         return worst
 
-    def stability(self, solver: Solver) -> Stability:
+    def stability(self, solver: Solver | str) -> Stability:
         """How large a step of a solver may be, from the eigenvalues of the forces as they are now."""
-        return stability(self, solver)
+        return stability(self, as_solver(solver))
 
     def add(self, x: Any, v: Any = None, **columns: Any) -> NDArray[np.int64]:
         """Add particles (see `Particles.add`); every force without a selection acts on them too. Returns their ids."""

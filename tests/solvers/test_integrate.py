@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from solver_problems import driven, fixed, oscillators, pendulum
 
 from pointmass.errors import InvalidInput
-from pointmass.solvers import SOLVERS, DormandPrince, Event, FunctionSystem, first_root, integrate
+from pointmass.solvers import RK4, SOLVERS, DormandPrince, Event, FunctionSystem, first_root, integrate
 
 
 def test_agrees_with_scipy():
@@ -153,3 +153,15 @@ def test_function_systems_differentiate_by_central_differences():
     numeric = FunctionSystem(system.deriv_eval, 2, 2)
     y = np.array([0.7, -0.2])
     np.testing.assert_allclose(numeric.jacobian(0.0, y).toarray(), system.jacobian(0.0, y).toarray(), atol=1e-9)
+
+
+def test_a_solver_may_be_named_and_must_be_made() -> None:
+    decay = FunctionSystem(lambda t, y: -y, 1)
+    by_name = integrate(decay, "rk4", (0.0, 1.0), 0.1, [1.0])
+    np.testing.assert_array_equal(by_name.y, integrate(decay, RK4(), (0.0, 1.0), 0.1, [1.0]).y)
+    with pytest.raises(InvalidInput, match=r"RK4\(\), with brackets"):
+        integrate(decay, RK4, (0.0, 1.0), 0.1, [1.0])  # type: ignore[arg-type]
+    with pytest.raises(InvalidInput, match="unknown solver 'rk5'"):
+        integrate(decay, "rk5", (0.0, 1.0), 0.1, [1.0])
+    with pytest.raises(InvalidInput, match="not 7"):
+        integrate(decay, 7, (0.0, 1.0), 0.1, [1.0])  # type: ignore[arg-type]

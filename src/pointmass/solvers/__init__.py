@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pointmass.errors import unknown
 from pointmass.solvers.advance import Stats, advance
 from pointmass.solvers.base import Solver, Step, System
 from pointmass.solvers.bdf2 import BDF2
@@ -20,6 +19,7 @@ from pointmass.solvers.implicit_midpoint import ImplicitMidpoint
 from pointmass.solvers.integrate import Solution, integrate
 from pointmass.solvers.leapfrog import Leapfrog
 from pointmass.solvers.midpoint import Midpoint
+from pointmass.solvers.registry import ALIASES, SOLVERS, as_solver, find_solver
 from pointmass.solvers.rk4 import RK4
 from pointmass.solvers.splitting import Splitting, Substep
 from pointmass.solvers.stability import amplification, largest_safe_step
@@ -56,53 +56,9 @@ __all__ = [
     "Yoshida4",
     "advance",
     "amplification",
+    "as_solver",
     "find_solver",
     "first_root",
     "integrate",
     "largest_safe_step",
 ]
-
-SOLVERS: dict[str, type[Solver]] = {
-    solver.name: solver
-    for solver in (
-        Euler,
-        SymplecticEuler,
-        Midpoint,
-        Heun,
-        RK4,
-        Leapfrog,
-        Yoshida4,
-        BogackiShampine,
-        DormandPrince,
-        ImplicitEuler,
-        ImplicitMidpoint,
-        BDF2,
-    )
-}
-
-ALIASES: dict[str, str] = {
-    "backward_euler": "implicit_euler",
-    "bogacki_shampine": "bs32",
-    "dormand_prince": "dopri5",
-    "explicit_euler": "euler",
-    "explicit_midpoint": "midpoint",
-    "forward_euler": "euler",
-    "semi_implicit_euler": "symplectic_euler",
-    "velocity_verlet": "leapfrog",
-    "verlet": "leapfrog",
-}
-
-
-def find_solver(name: str) -> type[Solver]:
-    """The solver of a name or an alias; case does not matter, and "-" is "_".
-
-    Raises
-    ------
-    InvalidInput
-        No solver has this name.
-    """
-    key = str(name).lower().replace("-", "_")
-    key = ALIASES.get(key, key)
-    if key not in SOLVERS:
-        raise unknown("solver", name, (*SOLVERS, *ALIASES))
-    return SOLVERS[key]

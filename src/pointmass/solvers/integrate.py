@@ -15,6 +15,7 @@ from pointmass.solvers.advance import Stats, advance
 from pointmass.solvers.base import Array, Memory, Solver, Step, System
 from pointmass.solvers.events import Event, first_root
 from pointmass.solvers.islands import Mask, number_of
+from pointmass.solvers.registry import as_solver
 
 PIECES = 4  # parts of each step in which an event is looked for
 ON_GRID = 1e-9  # of a step: a time this close to its end is on it
@@ -101,7 +102,7 @@ class Solution:
 
 def integrate(
     system: System,
-    solver: Solver,
+    solver: Solver | str,
     t_span: tuple[float, float],
     dt: float,
     y0: ArrayLike | None = None,
@@ -113,6 +114,7 @@ def integrate(
 
     Parameters
     ----------
+    solver : or its name, such as "rk4".
     t_span : start and end [s].
     dt : distance of the grid [s], and the step of a solver with fixed steps; an adaptive one takes several, or one.
     y0 : state at the start, shape (dim,); that of the system (its `get_state`) if None.
@@ -126,6 +128,9 @@ def integrate(
     Diverged
         As `advance`.
     """
+    solver = as_solver(solver)
+    if getattr(system, "colliders", ()):
+        raise InvalidInput("integrate knows no collisions: run a system with colliders in a Simulation")
     times = _grid(t_span, number("dt", dt, above=0.0, unit="s"))
     y = _initial(system, y0)
     memory: Memory = solver.start(system)
@@ -183,9 +188,7 @@ def _advance(
     return Interval(start, end, y, y1, tuple(steps)), memory, stats
 
 
-def _happenings(
-    interval: Interval, events: Sequence[Event], found: list[list[tuple[float, Array]]]
-) -> float | None:
+def _happenings(interval: Interval, events: Sequence[Event], found: list[list[tuple[float, Array]]]) -> float | None:
     """Adds what happened in the interval to `found`; the time of the first terminal event."""
     if not events:
         return None
