@@ -484,7 +484,7 @@ def test_mutations_of_a_scene_give_a_sentence_or_a_scene(data: Any) -> None:
 
 @pytest.mark.full
 @given(st.data())
-@settings(max_examples=10_000, deadline=None)
+@settings(max_examples=3_000, deadline=None)
 def test_many_mutations(data: Any) -> None:
     try_document(data)
 

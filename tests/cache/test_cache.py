@@ -109,6 +109,14 @@ def test_a_recorded_scene_is_the_scene(tmp_path: Path) -> None:
     assert len(about["scene_hash"]) == 64
 
 
+@pytest.mark.parametrize("name", SCENES)
+def test_frames_of_shipped_scenes_are_those_that_were_seen(tmp_path: Path, name: str) -> None:
+    scene = SCENES[name]().build()
+    cache = record(scene.simulation(), tmp_path / "s.zarr", 4, 30, scene=scene)
+    for live, stored in zip(scene.simulation().frames(4, 30), cache, strict=True):
+        assert_same_frame(live, stored)
+
+
 def test_particles_come_and_go(tmp_path: Path) -> None:
     scene = pm.Scene(emitters=[pm.Nozzle(rate=200.0, lifetime=0.1)], forces=[pm.Gravity()])
     cache = record(scene.simulation(), tmp_path / "n.zarr", 12, scene=scene)
