@@ -25,6 +25,9 @@ class Described:
         self.arguments = bind(cls, *args, **kwargs)
         return self
 
+    def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]:
+        return (), self.arguments  # copies and pickles are made like the object itself
+
     def __repr__(self) -> str:
         inside = ", ".join(f"{k}={v!r}" for k, v in self.arguments.items())
         return f"{type(self).__name__}({inside if len(inside) < 100 else '...'})"

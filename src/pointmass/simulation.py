@@ -32,8 +32,7 @@ class Simulation:
     system : belongs to the simulation from now on.
     solver : SymplecticEuler() by default, RK4() for a flow.
     dt : the solver's step [s], on the grid t0 + k dt with whole k; 1/240 by default. An adaptive solver makes steps
-        of its own
-        in between. How often frames are looked at changes nothing.
+        of its own in between. How often frames are looked at changes nothing.
     emitters : where particles come from.
     look : how frames look.
     seed : all chance comes from it.

@@ -118,12 +118,13 @@ def _extreme(matrix: Any, inertia: NDArray[np.floating[Any]] | None) -> NDArray[
             squares = eigsh(stiff, k=WANTED, which="LA", v0=start[:n], tol=ACCURACY, return_eigenvectors=False)
             return np.concatenate([sign * np.sqrt(squares.astype(complex)) for sign in (1j, -1j)])
     found: list[NDArray[np.complex128]] = []
+    values: NDArray[Any]
     for which in ("LM", "LI", "SR"):
         try:
             values = eigs(matrix, WANTED, v0=start, return_eigenvectors=False, which=which, **ITERATION)
         except ArpackNoConvergence as error:  # where all motions are of one kind, another kind is not found
             values = error.eigenvalues
-        found.append(np.asarray(values, np.complex128))
+        found.append(values.astype(np.complex128))
     extreme = np.concatenate(found)
     if not len(extreme):
         raise InvalidInput("the highest frequency of this system could not be found: try a smaller part of it")

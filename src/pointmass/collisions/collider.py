@@ -29,7 +29,8 @@ class Collider(Described, ABC):
     restitution : k_r in [0, 1].
     friction : Coulomb's mu, at least 0.
     eps : how near is in contact [m].
-    contact : "swept": nothing tunnels, the time of impact is found; "discrete": the lecture's test at the end of each step.
+    contact : "swept": nothing tunnels, the time of impact is found; "discrete": the lecture's test at the end of each
+        step.
     motion : of the reference point, in time.
     bulges : True where the solid is convex (ball, block): a line between two free points may pass through it. False
         where the free space is convex (plane, inside of a sphere).
@@ -65,10 +66,9 @@ class Collider(Described, ABC):
         """Gradient of the distance, unit vectors, shape (k, 3)."""
 
     def bending(self, x: Array, v: Array) -> Array:
-        """How fast the surface curves away under a velocity [m/s^2], shape (k,): v . H v, H the Hessian of the
-        distance.
+        """How fast the surface curves away under a velocity [m/s^2], shape (k,); 0 for flat surfaces.
 
-        `x` is relative to the place. 0 for flat surfaces.
+        It is v . H v with H the Hessian of the distance; `x` is relative to the place.
         """
         return np.zeros(len(x))
 

@@ -69,8 +69,7 @@ class Contacts:
     """The filter on forces. It is set up before each piece of a step and stays the same during it.
 
     With `lagged`, loads and whether friction holds are those of the start of the piece, and what stands then cannot
-    lift off before the
-    next one: the filter is then linear, and Newton's method sees its exact Jacobian.
+    lift off before the next one: the filter is then linear, and Newton's method sees its exact Jacobian.
     """
 
     def __init__(self, surfaces: Sequence[Collider], order: int, lagged: bool) -> None:
@@ -141,8 +140,7 @@ class Contacts:
         """Bring those that stood back to their surface at the end of a piece; in place.
 
         Who is held by friction goes where its place on the surface goes, whom friction stopped is where it came to
-        rest, who is pressed on is
-        put back on the surface, and nobody is left inside.
+        rest, who is pressed on is put back on the surface, and nobody is left inside.
 
         Parameters
         ----------
@@ -197,8 +195,7 @@ class Contacts:
         relative = v[rows] - motion
         relative -= rows_dot(relative, stand.normal)[:, None] * stand.normal
         speed = lengths(relative)
-        bounce = np.sqrt(2 * surface.eps * stand.load / m[rows])  # the speed that counts as resting, across the
-        surface
+        bounce = np.sqrt(2 * surface.eps * stand.load / m[rows])  # across the surface this speed counts as resting
         speed = np.where(speed > _roundoff(v[rows], motion) + STILL * np.finfo(v.dtype).eps * bounce, speed, 0)
         stand.speed, stand.slide = speed, directions(relative, speed, NONE)
         v[rows] = np.where((speed == 0)[:, None], motion, v[rows])

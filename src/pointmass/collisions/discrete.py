@@ -15,8 +15,7 @@ def bounce(
     """Respond where (X - P) . N < eps and N . V < 0; in place. Returns who did.
 
     What has sunk in is put back on the surface, so that a soft bounce cannot leave it stuck below. A fast particle
-    can jump
-    through a thin wall between two tests: that is what `contact="swept"` is for.
+    can jump through a thin wall between two tests: that is what `contact="swept"` is for.
     """
     gap = surface.distance(x, t) - radius
     hit = moved & (gap < surface.eps)

@@ -13,8 +13,7 @@ def respond(v: Array, normal: Array, surface: Array, restitution: float, frictio
     """Velocity after an impact: V' = V_T - k_r V_N in the frame of the surface, with Coulomb friction on V_T.
 
     Friction takes at most mu (1 + k_r) |V_N| off the tangential speed and never turns it round (Bridson, Fedkiw &
-    Anderson
-    2002). Rows that do not head into the surface (N . V >= 0) are left as they are.
+    Anderson 2002). Rows that do not head into the surface (N . V >= 0) are left as they are.
 
     Parameters
     ----------
@@ -36,10 +35,9 @@ def respond(v: Array, normal: Array, surface: Array, restitution: float, frictio
 def respond_pair(
     x1: Array, v1: Array, m1: Any, x2: Array, v2: Array, m2: Any, restitution: float
 ) -> tuple[Array, Array]:
-    """Velocities of two balls after they meet: the impulse j = -(1 + e) v_rel . n / (1/m1 + 1/m2) along the line of
-    centres.
+    """Velocities of two balls after they meet.
 
-    Balls that part are left as they are. Arrays have shape (k, 3), masses are numbers or of shape (k,).
+    The impulse along the line of centres is j = -(1 + e) v_rel . n / (1/m1 + 1/m2). Balls that part are left as they are. Arrays have shape (k, 3), masses are numbers or of shape (k,).
     """
     d = x1 - x2
     size = np.sqrt(rows_dot(d, d))[:, None]

@@ -1,2 +1,1 @@
-"""What takes a system from one step to the next. Here the reference path: NumPy, the lecture's loop, any Python
-force."""
+"""What takes a system from one step to the next: the reference path in NumPy, for any Python force."""

@@ -1,9 +1,8 @@
 """The reference engine: the solver's step, then what the colliders make of it, until every island has arrived.
 
 The solver makes its step. Each particle's path is cast against the colliders; at its first hit it responds. A
-particle that is
-an island of its own is stepped again by its solver over what is left of the step; one that others pull on finishes
-the step ballistically with its new velocity.
+particle that is an island of its own is stepped again by its solver over what is left of the step; one that others
+pull on finishes the step ballistically with its new velocity.
 """
 
 from __future__ import annotations
@@ -104,30 +103,35 @@ class ReferenceEngine:
         system.set_state(y, t1)
 
     def state_at(self, t: float) -> Array:
-        """State of the present particles at a time within the last step, shape (dim,): dense output; nothing is
-        changed.
+        """State of the present particles at a time within the last step, shape (dim,); nothing is changed.
 
-        Particles that were born later are where they will be born.
+        Positions follow the cubics that are cast against the colliders (a flow: the solver's dense output). Particles
+        that were born later are where they will be born.
         """
         system = self.system
+        state = system.get_state()
         if t >= system.t or not self._pieces:
-            return system.get_state()
+            return state
         y = self._pieces[0].step.y0
         for piece in self._pieces:
-            theta = (t - piece.t) / np.where(piece.h > 0, piece.h, 1)
-            inside = (piece.h > 0) & (theta >= 0)
-            theta = np.clip(theta, 0, 1)
-            y = np.where(inside, piece.step.dense(theta) + theta * piece.moved, y)
-        if self._ids is system.particles.id:
-            return y
+            theta = np.clip((t - piece.t) / np.where(piece.h > 0, piece.h, 1), 0, 1)
+            inside = (piece.h > 0) & (piece.t <= t)
+            y = np.where(inside, self._between(piece, theta) + theta * piece.moved, y)
         then, now = _match(self._ids, system.particles.id)
-        state = system.get_state()
         _by_particle(state, system.order)[:, now] = _by_particle(y, system.order)[:, then]
         return state
 
+    def _between(self, piece: Piece, theta: Array) -> Array:
+        """What the solver's step says about the fractions theta of a piece, shape (dim,)."""
+        if self.system.order == 1:
+            return piece.step.dense(theta)
+        (x0, v0), (x1, v1) = _by_particle(piece.step.y0, 2), _by_particle(piece.step.y1, 2)
+        one = slice(0, 3 * len(x0), 3)  # clocks are the same for all numbers of a particle
+        path = Paths(x0, v0, x1, v1, piece.t[one], piece.h[one], np.zeros(len(x0)))
+        return np.concatenate([path.position(theta[one]).ravel(), path.velocity(theta[one]).ravel()])
+
     def _fit_memory(self) -> None:
-        """Carry what the solver remembers over births, deaths and new links: every particle and island keeps its
-        own."""
+        """Carry what the solver remembers over births, deaths and new links: each particle keeps its own."""
         system = self.system
         ids, islands = system.particles.id, system.island_of_particle
         if not self.memory or (self._ids is ids and self._islands is islands):
@@ -169,6 +173,8 @@ class ReferenceEngine:
 
     def _keep(self, step: Step, h: Array, moved: Array | float) -> None:
         length = np.tile(np.repeat(h[self._islands], 3), self.system.order)
+        if self.system.order == 1:
+            step.dense(0.5)  # asks for the slopes now: later the contacts are others
         self._pieces.append(Piece(step, np.broadcast_to(step.t, len(length)), length, moved))
 
     def _collide(self, step: Step, h: Array) -> tuple[Array, Array, Mask]:
@@ -261,8 +267,7 @@ class ReferenceEngine:
         """Put out those whom one surface, or the end of their patience, pushed into another one; in place.
 
         Who began the step inside may stay as deep. Where surfaces leave no room at all, as in a closing press,
-        somebody
-        stays inside.
+        somebody stays inside.
         """
         radius = self.system.particles.radius
         for _ in range(EVICTIONS):
