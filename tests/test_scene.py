@@ -329,6 +329,8 @@ BODY = '[[bodies]]\ntype = "chain"\n'
         ('[[bodies]]\ntype = "scatter"\n', r"bodies.0 \(scatter\) needs 'count': a whole number"),
         (BODY + "lenght = 2\n", r"unknown key in bodies.0 \(chain\): 'lenght': did you mean 'length'"),
         (BODY + "links = 2.5\n", "bodies.0.links = 2.5 is not allowed: it must be a whole number"),
+        (BODY + f"links = {10**30}\n", "bodies.0.links = 10+ is not allowed: a whole number has at most 64 bits"),
+        (BODY + f"links = {10**18}\n", r"bodies.0 \(chain\) does not fit into memory"),
         (BODY + "mass = -1\n", r"bodies.0 \(chain\): mass = -1 is not allowed"),
         (BODY + "name = 3\n", "bodies.0.name = 3 is not allowed: it must be text in quotes"),
         (BODY + '[look]\ncolour = "red"\n', "unknown key in look: 'colour': did you mean 'color'"),
@@ -413,7 +415,25 @@ SEEDS = [
 ]
 JUNK = st.one_of(
     st.sampled_from(
-        [None, "", "x", "1/0", "a.b", [], {}, [[]], [{}], True, -1, 0, 10**30, 1e308, float("nan"), float("inf")]
+        [
+            None,
+            "",
+            "x",
+            "1/0",
+            "a.b",
+            [],
+            {},
+            [[]],
+            [{}],
+            True,
+            -1,
+            0,
+            10**30,
+            10**18,
+            1e308,
+            float("nan"),
+            float("inf"),
+        ]
     ),
     st.sampled_from(
         [

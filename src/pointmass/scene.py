@@ -364,6 +364,8 @@ def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, fol
         return registry[kind](**values)
     except InvalidInput as error:
         raise InvalidInput(f"{where} ({kind}): {error}") from None
+    except (MemoryError, OverflowError, ValueError) as error:  # NumPy's, about sizes that no machine holds
+        raise InvalidInput(f"{where} ({kind}) does not fit into memory: {error}") from None
 
 
 def _grid(value: Any, folder: Path | None) -> Any:

@@ -34,6 +34,7 @@ from pointmass.solvers import ALIASES, SOLVERS, find_solver
 VERSION = 1
 LISTS: dict[str, Mapping[str, Any]] = {"bodies": BODIES, "forces": FORCES, "colliders": COLLIDERS, "emitters": EMITTERS}
 DTYPES = ("float64", "float32")
+LARGEST = 2**63 - 1
 
 
 class Table(BaseModel):
@@ -311,9 +312,11 @@ def _check_table(where: str, form: type[Table], table: Any, prefix: str) -> None
 
 
 def _check_numbers(value: Any, path: str = "") -> None:
-    """Refuse NaN everywhere, and infinity where nothing lasts for ever."""
+    """Refuse NaN everywhere, infinity where nothing lasts for ever, and whole numbers that no array holds."""
     if isinstance(value, float) and (math.isnan(value) or (math.isinf(value) and not path.startswith("emitters."))):
         raise InvalidInput(f"{path} = {value} is not allowed: it must be a finite number")
+    if isinstance(value, int) and not -LARGEST <= value <= LARGEST:
+        raise InvalidInput(f"{path} = {shown(value)} is not allowed: a whole number has at most 64 bits, as in TOML")
     items = value.items() if isinstance(value, Mapping) else enumerate(value) if isinstance(value, list) else ()
     for key, item in items:
         _check_numbers(item, f"{path}.{key}" if path else str(key))
