@@ -1,0 +1,307 @@
+"""The public names, each from its home. `__init__.py` reads this list: they are imported on first use."""
+
+from .bodies import (
+    BODIES as BODIES,
+)
+from .bodies import (
+    Body as Body,
+)
+from .bodies import (
+    chain as chain,
+)
+from .bodies import (
+    lattice as lattice,
+)
+from .bodies import (
+    points as points,
+)
+from .bodies import (
+    scatter as scatter,
+)
+from .cache import (
+    Cache as Cache,
+)
+from .cache import (
+    record as record,
+)
+from .collisions import (
+    COLLIDERS as COLLIDERS,
+)
+from .collisions import (
+    Box as Box,
+)
+from .collisions import (
+    Collider as Collider,
+)
+from .collisions import (
+    Plane as Plane,
+)
+from .collisions import (
+    Polygon as Polygon,
+)
+from .collisions import (
+    Sphere as Sphere,
+)
+from .collisions import (
+    respond as respond,
+)
+from .collisions import (
+    respond_pair as respond_pair,
+)
+from .emitters import (
+    EMITTERS as EMITTERS,
+)
+from .emitters import (
+    Emitter as Emitter,
+)
+from .emitters import (
+    Nozzle as Nozzle,
+)
+from .errors import (
+    Diverged as Diverged,
+)
+from .errors import (
+    InvalidInput as InvalidInput,
+)
+from .errors import (
+    PointmassError as PointmassError,
+)
+from .forces import (
+    FORCES as FORCES,
+)
+from .forces import (
+    Angles as Angles,
+)
+from .forces import (
+    Attractor as Attractor,
+)
+from .forces import (
+    Drag as Drag,
+)
+from .forces import (
+    Field as Field,
+)
+from .forces import (
+    Flow as Flow,
+)
+from .forces import (
+    Force as Force,
+)
+from .forces import (
+    Gravitation as Gravitation,
+)
+from .forces import (
+    Gravity as Gravity,
+)
+from .forces import (
+    Harmonic as Harmonic,
+)
+from .forces import (
+    Magnetic as Magnetic,
+)
+from .forces import (
+    PointVortices as PointVortices,
+)
+from .forces import (
+    QuadraticDrag as QuadraticDrag,
+)
+from .forces import (
+    Springs as Springs,
+)
+from .forces import (
+    Vortex as Vortex,
+)
+from .forces import (
+    Wind as Wind,
+)
+from .forces import (
+    load_grid as load_grid,
+)
+from .frame import (
+    Arrows as Arrows,
+)
+from .frame import (
+    Camera as Camera,
+)
+from .frame import (
+    Curves as Curves,
+)
+from .frame import (
+    Frame as Frame,
+)
+from .frame import (
+    Points as Points,
+)
+from .frame import (
+    Segments as Segments,
+)
+from .frame import (
+    Triangles as Triangles,
+)
+from .laws.arrays import (
+    ArrayForce as ArrayForce,
+)
+from .laws.arrays import (
+    array_force as array_force,
+)
+from .laws.elements import (
+    element_force as element_force,
+)
+from .laws.elements import (
+    spring_force as spring_force,
+)
+from .laws.functions import (
+    absolute as absolute,
+)
+from .laws.functions import (
+    add as add,
+)
+from .laws.functions import (
+    atan2 as atan2,
+)
+from .laws.functions import (
+    cos as cos,
+)
+from .laws.functions import (
+    cross as cross,
+)
+from .laws.functions import (
+    dot as dot,
+)
+from .laws.functions import (
+    exp as exp,
+)
+from .laws.functions import (
+    floor as floor,
+)
+from .laws.functions import (
+    inverse as inverse,
+)
+from .laws.functions import (
+    length as length,
+)
+from .laws.functions import (
+    log as log,
+)
+from .laws.functions import (
+    maximum as maximum,
+)
+from .laws.functions import (
+    minimum as minimum,
+)
+from .laws.functions import (
+    pow as pow,
+)
+from .laws.functions import (
+    scale as scale,
+)
+from .laws.functions import (
+    sin as sin,
+)
+from .laws.functions import (
+    sqrt as sqrt,
+)
+from .laws.functions import (
+    sub as sub,
+)
+from .laws.functions import (
+    tan as tan,
+)
+from .laws.functions import (
+    where as where,
+)
+from .laws.grid import (
+    Grid as Grid,
+)
+from .laws.unary import (
+    unary_force as unary_force,
+)
+from .laws.unary import (
+    velocity_field as velocity_field,
+)
+from .look import (
+    Look as Look,
+)
+from .particles import (
+    Particles as Particles,
+)
+from .render import (
+    Style as Style,
+)
+from .render import (
+    fit_camera as fit_camera,
+)
+from .render import (
+    image as image,
+)
+from .render import (
+    write as write,
+)
+from .scene import (
+    Scene as Scene,
+)
+from .scene import (
+    body_of as body_of,
+)
+from .scenes import (
+    SCENES as SCENES,
+)
+from .simulation import (
+    Simulation as Simulation,
+)
+from .solvers import (
+    BDF2 as BDF2,
+)
+from .solvers import (
+    RK4 as RK4,
+)
+from .solvers import (
+    SOLVERS as SOLVERS,
+)
+from .solvers import (
+    BogackiShampine as BogackiShampine,
+)
+from .solvers import (
+    DormandPrince as DormandPrince,
+)
+from .solvers import (
+    Euler as Euler,
+)
+from .solvers import (
+    Event as Event,
+)
+from .solvers import (
+    FunctionSystem as FunctionSystem,
+)
+from .solvers import (
+    Heun as Heun,
+)
+from .solvers import (
+    ImplicitEuler as ImplicitEuler,
+)
+from .solvers import (
+    ImplicitMidpoint as ImplicitMidpoint,
+)
+from .solvers import (
+    Leapfrog as Leapfrog,
+)
+from .solvers import (
+    Midpoint as Midpoint,
+)
+from .solvers import (
+    SymplecticEuler as SymplecticEuler,
+)
+from .solvers import (
+    Yoshida4 as Yoshida4,
+)
+from .solvers import (
+    integrate as integrate,
+)
+from .stability import (
+    Stability as Stability,
+)
+from .system import (
+    ParticleSystem as ParticleSystem,
+)
+
+__version__: str
