@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,8 +78,8 @@ def checked_size(size: tuple[int, int]) -> tuple[int, int]:
     return int(sides[0]), int(sides[1])
 
 
-def _light(frame: Frame, camera: Camera, view: View, style: Style) -> tuple[F32, F32]:
-    """Linear light of the picture, and what spills around bright things at half the size."""
+def _light(frame: Frame, camera: Camera, view: View, style: Style) -> tuple[F32, F32 | None]:
+    """Linear light of the picture, and what spills around bright things at half the size; both as three planes."""
     tables = _Tables()
     for drawable in frame.drawables:
         tables.add(drawable, frame, view, style.shadows)
@@ -88,44 +87,27 @@ def _light(frame: Frame, camera: Camera, view: View, style: Style) -> tuple[F32,
     map_ = shadow(tables.casters, key_direction(style, view)) if tables.casters else no_shadow()
     from pointmass.render import kernels
 
-    draw: Callable[..., None] = kernels.draw
+    draw: Callable[..., bool] = kernels.draw
     height, width = view.height, view.width
-    bands = -(-height // kernels.BAND)
-    boxes = np.concatenate((faces.box, round_ones.box, lines.box))[:, 2:]
-    solids, softs = (
-        _lists(order, *kernels.sort_into_bands(boxes[order], bands)) for order in _orders((faces, round_ones, lines))
-    )
-    light = np.empty((height, width, 3), dtype=np.float32)
-    bright = np.empty(((height + 1) // 2, (width + 1) // 2, 3), dtype=np.float32)
+    columns, bands = -(-width // kernels.TILE), -(-height // kernels.BAND)
+    boxes = np.concatenate((faces.box, round_ones.box, lines.box))
+    lists: list[Ints] = []
+    for order in _orders((faces, round_ones, lines)):
+        starts, places = kernels.sort_into_tiles(boxes[order], columns, bands)
+        lists += [starts, order[places]]
+    light = np.empty((3, height, width), dtype=np.float32)
+    bright = np.empty((3, (height + 1) // 2, (width + 1) // 2), dtype=np.float32)
     background = _gradient(style, height)
-    middle = np.array((view.focal, 0.5 * width, 0.5 * height), dtype=np.float32)
-    layered = bool((~faces.solid).any())
+    middle = np.array((view.focal, 0.5 * width, 0.5 * height, 1.0 / view.focal), dtype=np.float32)
     things = [part for table in (faces, round_ones, lines) for part in (table.rows, table.box)]
-    lamp_ = lamp(style, view, camera, map_)
+    light_from = (lamp(style, view, camera, map_), map_.depth, map_.matrix)
+    spilled = np.zeros(bands, dtype=bool)
 
     def band(i: int) -> None:
-        top, bottom = i * kernels.BAND, min((i + 1) * kernels.BAND, height)
-        samples = (bottom - top) * width * style.samples**2
-        draw(
-            top,
-            np.empty(3 * samples, dtype=np.float32),
-            np.zeros(samples, dtype=np.float32),
-            light[top:bottom],
-            bright[top // 2 : (bottom + 1) // 2],
-            background[top:bottom],
-            middle,
-            _offsets(style.samples),
-            layered,
-            solids[i],
-            softs[i],
-            *things,
-            lamp_,
-            map_.depth,
-            map_.matrix,
-        )
+        spilled[i] = draw(i, light, bright, background, middle, _offsets(style.samples), *lists, *things, *light_from)
 
     each(band, bands)
-    return light, bright
+    return light, bright if spilled.any() else None
 
 
 class _Tables:
@@ -175,28 +157,27 @@ def _orders(tables: tuple[Table, ...]) -> tuple[Ints, Ints]:
     return front.astype(np.int64), soft.astype(np.int64)
 
 
-def _develop(light: F32, spill: F32, style: Style) -> Image:
+def _develop(light: F32, spill: F32 | None, style: Style) -> Image:
     """Bloom, tone map, sRGB."""
     from pointmass.render import kernels_post
 
-    levels = max(1, round(np.log2(max(light.shape[0], 2) / 16.0)))
-    if style.bloom > 0.0:
-        kernels_post.bloom(spill, levels, np.float32(SPREAD))
-    picture = np.empty(light.shape, dtype=np.uint8)
-    numbers = (np.float32(style.bloom), np.float32(style.exposure), _srgb_curve(), _dither())
+    height, width = light.shape[1:]
+    strength = np.float32(style.bloom)
+    if spill is None or style.bloom == 0.0:
+        strength, spill = np.float32(0.0), np.zeros((3, 1, 1), dtype=np.float32)
+    else:
+        levels = max(1, round(np.log2(max(height, 2) / 16.0)))
+        planes = spill
+        each(lambda i: kernels_post.bloom(planes[i], levels, np.float32(SPREAD)), 3)
+    picture = np.empty((height, width, 3), dtype=np.uint8)
+    numbers = (strength, np.float32(style.exposure), _srgb_curve(), _dither())
 
     def rows(i: int) -> None:
-        last = min((i + 1) * ROWS, len(light))
+        last = min((i + 1) * ROWS, height)
         kernels_post.develop(i * ROWS, last, picture, light, spill, *numbers)
 
-    each(rows, -(-len(light) // ROWS))
+    each(rows, -(-height // ROWS))
     return picture
-
-
-def _lists(order: Ints, starts: Ints, places: Ints) -> list[Ints]:
-    """For each band the numbers of its things."""
-    things = order[places]
-    return [things[a:b] for a, b in pairwise(starts)]
 
 
 def _gradient(style: Style, height: int) -> F32:

@@ -1,4 +1,7 @@
-"""The loops that turn light into a picture: bloom, tone map, sRGB, dither."""
+"""The loops that turn light into a picture: bloom, tone map, sRGB, dither.
+
+They work along lines of one colour, so that the processor does many pixels at once.
+"""
 
 # Numba infers the types of kernels.
 # mypy: disable-error-code="no-untyped-def, no-untyped-call, untyped-decorator, no-any-return, call-arg"
@@ -13,71 +16,63 @@ from pointmass.render.inner import bare, inner
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 HALF = np.float32(0.5)
+QUARTER = np.float32(0.25)
+THREE_QUARTERS = np.float32(0.75)
+ONE_EIGHTH = np.float32(0.125)
+THREE_EIGHTHS = np.float32(0.375)
 SHOULDER = np.float32(0.6)  # below this the tone map changes nothing
 BLINDING = np.float32(1e30)
 FADE = np.float32(0.5)  # how much a light that is too bright for its hue turns white
 
 
 @inner
-def _halve(fine, coarse):
-    """Half the size, with weights 1 3 3 1 along both axes."""
-    height, width = fine.shape[0], fine.shape[1]
+def _halve(fine, coarse, line):
+    """Half the size, with weights 1 3 3 1 along both axes; `line` is room for a row and two more cells."""
+    height, width = fine.shape
     for row in range(coarse.shape[0]):
-        for column in range(coarse.shape[1]):
-            r, g, b = ZERO, ZERO, ZERO
-            for j in range(4):
-                y = min(max(2 * row + j - 1, 0), height - 1)
-                wy = np.float32(0.375) if 0 < j < 3 else np.float32(0.125)
-                for i in range(4):
-                    x = min(max(2 * column + i - 1, 0), width - 1)
-                    w = wy * (np.float32(0.375) if 0 < i < 3 else np.float32(0.125))
-                    r += w * fine[y, x, 0]
-                    g += w * fine[y, x, 1]
-                    b += w * fine[y, x, 2]
-            coarse[row, column, 0] = r
-            coarse[row, column, 1] = g
-            coarse[row, column, 2] = b
+        above, upper = fine[max(2 * row - 1, 0)], fine[2 * row]
+        lower, below = fine[min(2 * row + 1, height - 1)], fine[min(2 * row + 2, height - 1)]
+        for x in range(width):
+            line[x + 1] = ONE_EIGHTH * (above[x] + below[x]) + THREE_EIGHTHS * (upper[x] + lower[x])
+        line[0], line[width + 1], line[width + 2] = line[1], line[width], line[width]
+        for x in range(coarse.shape[1]):
+            outer, nearer = line[2 * x] + line[2 * x + 3], line[2 * x + 1] + line[2 * x + 2]
+            coarse[row, x] = ONE_EIGHTH * outer + THREE_EIGHTHS * nearer
 
 
 @inner
-def _neighbours(index, count):
-    """The two coarse cells around a fine one: the nearer (weight 3/4) and the farther (1/4)."""
-    near = min(index // 2, count - 1)
-    far = min(max(near + (1 if index % 2 else -1), 0), count - 1)
-    return near, far
-
-
-@inner
-def _doubled(coarse, row, column):
-    """A coarse image between its cells, at a cell of twice its size."""
-    y, y2 = _neighbours(row, coarse.shape[0])
-    x, x2 = _neighbours(column, coarse.shape[1])
-    a, b, c = np.float32(9.0 / 16.0), np.float32(3.0 / 16.0), np.float32(1.0 / 16.0)
-    return (
-        a * coarse[y, x, 0] + b * (coarse[y, x2, 0] + coarse[y2, x, 0]) + c * coarse[y2, x2, 0],
-        a * coarse[y, x, 1] + b * (coarse[y, x2, 1] + coarse[y2, x, 1]) + c * coarse[y2, x2, 1],
-        a * coarse[y, x, 2] + b * (coarse[y, x2, 2] + coarse[y2, x, 2]) + c * coarse[y2, x2, 2],
-    )
+def _double(coarse, row, line, wide):
+    """One row of twice the size, between the cells of a coarse plane, into `wide`; `line` is room for a row of it."""
+    near = min(row // 2, coarse.shape[0] - 1)
+    far = min(max(near + (1 if row % 2 else -1), 0), coarse.shape[0] - 1)
+    here, there = coarse[near], coarse[far]
+    cells = coarse.shape[1]
+    for x in range(cells):
+        line[x + 1] = THREE_QUARTERS * here[x] + QUARTER * there[x]
+    line[0], line[cells + 1] = line[1], line[cells]
+    for x in range(cells):
+        wide[2 * x] = THREE_QUARTERS * line[x + 1] + QUARTER * line[x]
+        wide[2 * x + 1] = THREE_QUARTERS * line[x + 1] + QUARTER * line[x + 2]
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def bloom(bright, levels, decay):
-    """Spread `bright` in place: the sum of blurs, each twice as wide as the last and `decay` times as strong."""
+    """Spread one plane in place: the sum of blurs, each twice as wide as the last and `decay` times as strong."""
     pyramid = [bright]
+    line = np.empty(bright.shape[1] + 3, dtype=np.float32)
+    wide = np.empty(bright.shape[1] + 3, dtype=np.float32)
     for _ in range(levels):
         fine = pyramid[-1]
-        coarse = np.empty(((fine.shape[0] + 1) // 2, (fine.shape[1] + 1) // 2, 3), dtype=np.float32)
-        _halve(fine, coarse)
+        coarse = np.empty(((fine.shape[0] + 1) // 2, (fine.shape[1] + 1) // 2), dtype=np.float32)
+        _halve(fine, coarse, line)
         pyramid.append(coarse)
     for level in range(levels - 1, -1, -1):
         fine, coarse = pyramid[level], pyramid[level + 1]
         keep = ZERO if level == 0 else ONE - decay
         for row in range(fine.shape[0]):
-            for column in range(fine.shape[1]):
-                r, g, b = _doubled(coarse, row, column)
-                fine[row, column, 0] = keep * fine[row, column, 0] + decay * r
-                fine[row, column, 1] = keep * fine[row, column, 1] + decay * g
-                fine[row, column, 2] = keep * fine[row, column, 2] + decay * b
+            _double(coarse, row, line, wide)
+            for x in range(fine.shape[1]):
+                fine[row, x] = keep * fine[row, x] + decay * wide[x]
 
 
 @inner
@@ -90,35 +85,51 @@ def _roll(value):
 
 
 @inner
-def _byte(light, curve, dither):
-    index = np.int64(math.sqrt(min(max(light, ZERO), ONE)) * np.float32(curve.shape[0] - 1) + HALF)
-    return np.uint8(min(max(curve[index] + dither, ZERO), np.float32(255.0)))
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def develop(first, last, image, light, spill, strength, exposure, curve, pattern):
-    """Rows [first, last): tone map `light` plus `strength` times `spill` (of half the size) into sRGB bytes.
+def _tame(red, green, blue):
+    """The tone map, in place.
 
     The brightest channel goes through the shoulder and the others keep their ratio to it, so that a bright glow keeps
     its hue; part of the way each channel goes alone, which turns the hottest light towards white as film does.
     """
+    for x in range(len(red)):
+        r, g, b = red[x], green[x], blue[x]
+        if r <= SHOULDER and g <= SHOULDER and b <= SHOULDER:
+            continue
+        if not r + g + b < BLINDING:  # true for NaN too, which has no place in a table
+            r, g, b = ONE, ONE, ONE
+        top = max(r, g, b)
+        scale = (ONE - FADE) * _roll(top) / top
+        red[x] = scale * r + FADE * _roll(r)
+        green[x] = scale * g + FADE * _roll(g)
+        blue[x] = scale * b + FADE * _roll(b)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def develop(first, last, image, light, spill, strength, exposure, curve, pattern):
+    """Rows [first, last): tone map `light` plus `strength` times `spill` (of half the size) into sRGB bytes."""
     image, light, spill, curve, pattern = bare(image), bare(light), bare(spill), bare(curve), bare(pattern)
+    width = light.shape[2]
+    colors = np.empty((3, width), dtype=np.float32)
+    steps = np.empty(width, dtype=np.int32)
+    line = np.empty(spill.shape[2] + 3, dtype=np.float32)
+    wide = np.empty(2 * spill.shape[2], dtype=np.float32)
+    finest = np.float32(curve.shape[0] - 1)
     for row in range(first, last):
-        for column in range(light.shape[1]):
-            r, g, b = light[row, column, 0], light[row, column, 1], light[row, column, 2]
+        for channel in range(3):
+            source, target = light[channel, row], colors[channel]
             if strength > ZERO:
-                wide_r, wide_g, wide_b = _doubled(spill, row, column)
-                r, g, b = r + strength * wide_r, g + strength * wide_g, b + strength * wide_b
-            r, g, b = exposure * r, exposure * g, exposure * b
-            if not r + g + b < BLINDING:  # true for NaN too, which has no place in a table
-                r, g, b = ONE, ONE, ONE
-            top = max(r, g, b)
-            if top > SHOULDER:
-                scale = (ONE - FADE) * _roll(top) / top
-                r = scale * r + FADE * _roll(r)
-                g = scale * g + FADE * _roll(g)
-                b = scale * b + FADE * _roll(b)
-            dither = pattern[row % pattern.shape[0], column % pattern.shape[1]]
-            image[row, column, 0] = _byte(r, curve, dither)
-            image[row, column, 1] = _byte(g, curve, dither)
-            image[row, column, 2] = _byte(b, curve, dither)
+                _double(spill[channel], row, line, wide)
+                for x in range(width):
+                    target[x] = exposure * (source[x] + strength * wide[x])
+            else:
+                for x in range(width):
+                    target[x] = exposure * source[x]
+        _tame(colors[0], colors[1], colors[2])
+        thresholds = pattern[row % pattern.shape[0]]
+        for channel in range(3):
+            source = colors[channel]
+            for x in range(width):
+                steps[x] = np.int32(math.sqrt(min(max(source[x], ZERO), ONE)) * finest + HALF)
+            for x in range(width):
+                value = curve[steps[x]] + thresholds[x % len(thresholds)]
+                image[row, x, channel] = np.uint8(min(value, np.float32(255.0)))
