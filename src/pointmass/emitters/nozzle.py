@@ -26,7 +26,7 @@ class Nozzle(Emitter):
     ----------
     position : centre of the disc [m].
     direction : axis of the cone.
-    rate : births per second [1/s], greater than 0.
+    rate : births per second [1/s], greater than 0 and at most 1e9.
     speed, speed_range : mean and half-range of the speed [m/s] (Reeves 1983).
     cone : half-angle of the cone [degrees], in [0, 180].
     radius : of the disc [m], at least 0.
@@ -55,7 +55,7 @@ class Nozzle(Emitter):
     ) -> None:
         self.position = finite_array("position", position, (3,))
         self.direction = unit("direction", direction)
-        self.rate = number("rate", rate, above=0, unit="1/s")
+        self.rate = number("rate", rate, above=0, at_most=1e9, unit="1/s")
         self.speed = number("speed", speed, at_least=0, unit="m/s")
         self.speed_range = number("speed_range", speed_range, at_least=0, at_most=self.speed, unit="m/s")
         self.cone = number("cone", cone, at_least=0, at_most=180, unit="degrees")
