@@ -243,3 +243,21 @@ def test_memory_follows_links_that_are_switched():
     springs.enabled = True
     sim.step(3)
     assert sim.t == 9 / 60
+
+
+def test_run_comes_so_many_seconds_further() -> None:
+    sim = pm.Simulation(pm.ParticleSystem(pm.Particles([[0, 0, 0]]), pm.Gravity()), "leapfrog", dt=1 / 240)
+    sim.run(1.0)
+    assert sim.steps == 240
+    assert sim.system.particles.x[0, 1] == pytest.approx(-9.81 / 2, rel=1e-12)
+    sim.run(0.001)
+    assert sim.steps == 241
+    sim.run(0)
+    assert sim.steps == 241
+
+
+def test_a_solver_may_be_named() -> None:
+    system = pm.ParticleSystem(pm.Particles([[0, 0, 0]]))
+    assert pm.Simulation(system, "backward-euler").solver.name == "implicit_euler"
+    with pytest.raises(pm.InvalidInput, match=r"RK4\(\), with brackets"):
+        pm.Simulation(system, pm.RK4)  # type: ignore[arg-type]

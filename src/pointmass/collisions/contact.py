@@ -115,10 +115,14 @@ class Contacts:
     def forces(self, t: Any, x: Array, v: Array, m: Array, f: Array) -> None:
         """Take away what presses into the surfaces, and add friction (projected Gauss-Seidel over the contacts)."""
         looks = [self._look(stand, t, x, v, m) for stand in self.standing]
-        for _ in range(self._passes):
-            changed = [self._bear(stand, *look, f) for stand, look in zip(self.standing, looks, strict=True)]
-            if not any(changed):
-                break
+        # Loads before friction: in a corner, friction would else be spent on what another surface bears.
+        for friction in (False, True) if self._passes > 1 else (True,):
+            for _ in range(self._passes):
+                changed = [
+                    self._bear(stand, *look, f, friction) for stand, look in zip(self.standing, looks, strict=True)
+                ]
+                if not any(changed):
+                    break
 
     def projection(self, n: int) -> Any:
         """Directions in which contacts leave particles free, shape (3n, 3n): what the lagged filter does to df.
@@ -222,7 +226,7 @@ class Contacts:
         bend = surface.bending(local, v[rows] - surface.velocity(now))
         return mass[:, None] * surface.acceleration(now), mass * bend
 
-    def _bear(self, stand: Standing, carried: Array, bend: Array, f: Array) -> bool:
+    def _bear(self, stand: Standing, carried: Array, bend: Array, f: Array, friction: bool) -> bool:
         """Give each contact the force that it bears now; whether that is another than before."""
         rows, normal = stand.rows, stand.normal
         free = f[rows] - stand.given - carried
@@ -234,7 +238,7 @@ class Contacts:
             stand.pressed = load > 0
             load = np.maximum(load, 0)
         given = load[:, None] * normal
-        if self.order == 2 and stand.surface.friction > 0:
+        if friction and self.order == 2 and stand.surface.friction > 0:
             given = given + self._friction(stand, free - into[:, None] * normal, load)
         change = given - stand.given
         f[rows] += change

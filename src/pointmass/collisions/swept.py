@@ -167,7 +167,9 @@ def _deepest(approach: _Approach, a: Array, b: Array) -> Array:
     """
     enter, leave = (_newton(approach, p, q) for p, q in ((a, b), (b, a)))
     inside = enter + leave < 1
-    return np.where(inside, 0.5 * (enter + (1 - leave)), np.nan)
+    middle = np.full(len(a), np.nan)
+    middle[inside] = 0.5 * (enter[inside] + (1 - leave[inside]))
+    return middle
 
 
 def _newton(approach: _Approach, a: Array, b: Array) -> Array:

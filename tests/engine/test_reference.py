@@ -1,0 +1,134 @@
+"""Impacts inside of steps: islands, many events, corners, moving surfaces."""
+
+import numpy as np
+import pytest
+
+import pointmass as pm
+from pointmass.engine.reference import MOST_EVENTS, ReferenceEngine
+from pointmass.solvers import SOLVERS
+
+
+def engine(x, v, colliders, forces=(), solver=None, **columns):
+    system = pm.ParticleSystem(pm.Particles(x, v, **columns), forces, colliders)
+    return ReferenceEngine(system, solver or pm.Leapfrog()), system.particles
+
+
+@pytest.mark.parametrize("name", sorted(SOLVERS))
+def test_two_impacts_in_one_step(name):
+    e, p = engine(
+        [[0, 0, 0]], [[5, 0, 0]], [pm.Box(size=(2, 2, 2), inside=True, restitution=1)], solver=SOLVERS[name]()
+    )
+    e.step(0, 0.6)  # 3 m: to x = 1, back to -1 would be 3 m
+    assert p.x[0, 0] == pytest.approx(-1, abs=1e-9)
+    e.step(0.6, 1.0)
+    assert p.x[0, 0] == pytest.approx(1, abs=1e-9)
+
+
+def test_a_linked_particle_finishes_the_step_ballistically():
+    e, p = engine(
+        [[0, 0.1, 0], [5, 5, 5]], [[0, -1, 0], [0, 0, 0]], [pm.Plane(restitution=0.5)],
+        [pm.Springs([(0, 1)], k_s=0.0)],
+    )  # fmt: skip
+    e.step(0, 0.3)
+    np.testing.assert_allclose(p.x[0], [0, 0.1, 0], atol=1e-12)
+    np.testing.assert_allclose(p.v[0], [0, 0.5, 0], atol=1e-12)
+    assert e.stats.steps == 1
+
+
+def test_between_two_closing_walls_it_rests_in_the_end():
+    # Each bounce is shorter than the one before: the number of events is bounded and nobody tunnels.
+    walls = [pm.Plane(point=("-1 + t", 0, 0), normal=(1, 0, 0)), pm.Plane(point=("1 - t", 0, 0), normal=(-1, 0, 0))]
+    e, p = engine([[0, 0, 0]], [[30, 0, 0]], walls)
+    for k in range(9):
+        e.step(0.1 * k, 0.1 * (k + 1))
+        assert abs(p.x[0, 0]) <= 1 - 0.1 * (k + 1) + 1e-9
+    assert e.stats.steps <= 9 * (MOST_EVENTS + 2)
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.05])
+@pytest.mark.parametrize("gravity", [(0, -9.81, 0), (4, -5, 7), (-9.81, 0, 0)])
+def test_comes_to_rest_in_a_corner(radius, gravity):
+    room = pm.Box(size=(1, 1, 1), inside=True, restitution=0.4, friction=0.5)
+    e, p = engine([[0.1, 0.2, -0.1]], [[1, 2, 3]], [room], [pm.Gravity(gravity)], radius=radius)
+    for k in range(400):
+        e.step(k / 60, (k + 1) / 60)
+    assert room.distance(p.x, 0)[0] - radius >= -1e-12
+    assert not p.v.any()
+    x = p.x.copy()
+    e.step(10, 11)
+    np.testing.assert_array_equal(p.x, x)
+
+
+@pytest.mark.parametrize("opening", [0.5, 5.0, 60.0, 170.0])
+def test_comes_to_rest_in_a_wedge(opening):
+    half = np.radians(opening / 2)
+    walls = [pm.Plane(normal=(s * np.cos(half), np.sin(half), 0), restitution=0.3) for s in (1, -1)]
+    e, p = engine([[0.0, 1, 0]], [[0.01, -1, 0]], walls, [pm.Gravity()])
+    for k in range(90):
+        e.step(k / 60, (k + 1) / 60)
+        for wall in walls:
+            assert wall.distance(p.x, 0)[0] >= -1e-9
+    assert np.abs(p.v).max() < 0.1
+
+
+def test_a_rising_floor_lifts():
+    floor = pm.Plane(point=(0, "0.5*t**2", 0))
+    e, p = engine([[0, 0, 0]], None, [floor], [pm.Gravity()], solver=pm.SymplecticEuler())
+    for k in range(60):
+        e.step(k / 60, (k + 1) / 60)
+        assert 0 <= p.x[0, 1] - 0.5 * ((k + 1) / 60) ** 2 <= 2e-4
+
+
+def test_a_moving_ball_pushes_and_does_not_swallow():
+    ball = pm.Sphere(center=("-2 + 3*t", 0.01, 0), radius=0.5, restitution=0, friction=0)
+    e, p = engine([[0, 0, 0]], None, [ball])
+    for k in range(60):
+        e.step(k / 60, (k + 1) / 60)
+        assert ball.distance(p.x, (k + 1) / 60)[0] >= -1e-9
+    assert p.v[0, 0] > 2.9
+
+
+@pytest.mark.parametrize("collider", [pm.Plane(), pm.Sphere(center=(0, -1, 0)), pm.Box(center=(0, -0.5, 0))])
+def test_on_the_surface_at_the_start(collider):
+    e, p = engine([[0, 0, 0]], None, [collider], [pm.Gravity()])
+    for k in range(30):
+        e.step(k / 60, (k + 1) / 60)
+    np.testing.assert_allclose(p.x, 0, atol=1e-9)
+
+
+def test_who_starts_inside_does_not_sink():
+    e, p = engine([[0, -0.3, 0], [0, -0.3, 0]], [[0, -2, 0], [0, 5, 0]], [pm.Plane()], [pm.Gravity()])
+    for k in range(60):
+        e.step(k / 60, (k + 1) / 60)
+        assert p.x[0, 1] >= -0.3 - 1e-12
+    assert p.x[1, 1] >= 0
+
+
+def test_bdf2_forgets_at_an_impact():
+    # After a bounce the parabola through the past would be wrong: a linked ball starts anew like a single one.
+    results = []
+    for springs in ([], [pm.Springs([(0, 1)], k_s=0.0)]):
+        e, p = engine(
+            [[0, 0.1, 0], [9, 9, 9]], [[0, -1, 0], [0, 0, 0]], [pm.Plane(restitution=1.0)], springs, pm.BDF2()
+        )
+        for k in range(12):
+            e.step(k / 60, (k + 1) / 60)
+        results.append(p.x[0, 1])
+    np.testing.assert_allclose(results, 0.1, atol=1e-12)
+
+
+def test_neighbours_change_no_bits():
+    rng = np.random.default_rng(0)
+    x, v = rng.uniform(-0.8, 0.8, (6, 3)), rng.normal(size=(6, 3)) * 3
+
+    def room():
+        return [pm.Box(size=(2, 2, 2), inside=True, restitution=0.8), pm.Sphere(radius=0.3)]
+
+    for name in ("leapfrog", "dopri5"):
+        e, p = engine(x, v, room(), [pm.Gravity(), pm.Drag()], SOLVERS[name]())
+        one, q = engine(x[2:3], v[2:3], room(), [pm.Gravity(), pm.Drag()], SOLVERS[name]())
+        for k in range(30):
+            e.step(k / 30, (k + 1) / 30)
+            one.step(k / 30, (k + 1) / 30)
+        np.testing.assert_array_equal(p.x[2], q.x[0])
+        np.testing.assert_array_equal(p.v[2], q.v[0])
