@@ -133,7 +133,7 @@ def test_seeds():
 
 def test_arguments_are_checked():
     system = pm.ParticleSystem(pm.Particles([[0, 0, 0]]))
-    for wrong in ({"dt": 0}, {"dt": np.nan}, {"solver": "rk4"}, {"seed": -1}, {"emitters": [pm.Gravity()]}):
+    for wrong in ({"dt": 0}, {"dt": np.nan}, {"solver": "rk5"}, {"seed": -1}, {"emitters": [pm.Gravity()]}):
         with pytest.raises(pm.InvalidInput):
             pm.Simulation(system, **wrong)
 
