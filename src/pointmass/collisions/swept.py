@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pointmass.collisions.collider import Array, Collider, lengths, rows_dot
 from pointmass.solvers.events import first_root
 
+RESOLUTION = 2.0**-50  # of a fraction of the way
 MOST_CHORDS = 4096
 NEWTON_STEPS = 60
 SAMPLES = (0.0, 0.5, 1.0)  # of a step, where the acceleration of a moving surface is looked at
@@ -125,7 +126,8 @@ def first_hit(surface: Collider, paths: Paths) -> Array:
     low, high = _brackets(approach)
     crossed = np.isfinite(high)
     if crossed.any():
-        root = first_root(approach.take(crossed).gap, low[crossed], high[crossed])[0]
+        gap = approach.take(crossed).gap
+        root = first_root(gap, low[crossed], high[crossed], resolution=RESOLUTION)[0]
         theta[rows[crossed]] = np.where(np.isfinite(root), root, low[crossed])
     return theta
 

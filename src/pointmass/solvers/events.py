@@ -32,7 +32,7 @@ class Event:
 
 
 def first_root(
-    g: Callable[[Array], Array], low: Array, high: Array, *, pieces: int = 1
+    g: Callable[[Array], Array], low: Array, high: Array, *, pieces: int = 1, resolution: float = 0.0
 ) -> tuple[Array, Array, Array, Array]:
     """The first change of sign of each lane of g, between two numbers a few roundings apart.
 
@@ -41,6 +41,8 @@ def first_root(
     g : shape (k,) -> shape (k,); lane i sees only its own argument.
     low, high : where to look, low <= high, shape (k,).
     pieces : equal parts of each bracket that are looked at first; two changes of sign in one part are not seen.
+
+    resolution : a bracket of this width is narrow enough anyway; 0 = a few roundings of its ends.
 
     Returns
     -------
@@ -57,6 +59,7 @@ def first_root(
     found = (fa >= 0.0) != (fb >= 0.0)
     width = np.where(found, b - a, 0.0)
     goal = ULPS * np.finfo(np.float64).eps * np.maximum(np.maximum(np.abs(a), np.abs(b)), np.finfo(np.float64).tiny)
+    goal = np.maximum(goal, resolution)
     half = np.maximum(np.ceil(np.log2(np.maximum(width / goal, 1.0))), 0.0) + 1.0  # bisections, and n_0
     for k in range(int(half.max(initial=0.0)) + 1):
         open_ = found & (b - a > goal)
