@@ -85,8 +85,8 @@ def test_drag_alone():
 @pytest.mark.parametrize("solver", [pm.Leapfrog(), pm.RK4(), pm.SymplecticEuler()])
 @pytest.mark.parametrize("drag", [1.0, 60.0, 400.0])
 def test_the_limit_holds_where_drag_and_springs_mix(solver, drag):
-    # Strong drag on some and stiff springs on others: whatever limits, a run just below it stays bounded. It is exact but
-    # for splitting methods under strong drag, where it is a lower bound (see `largest_safe_step`).
+    # Strong drag on some and stiff springs on others: whatever limits, a run just below it stays bounded. It is exact
+    # but for splitting methods under strong drag, where it is a lower bound (see `largest_safe_step`).
     p = pm.Particles([[0, 0, 0], [1, 0, 0], [5, 0, 0]], m=1.0)
     p.pin([0])
     system = pm.ParticleSystem(p, [pm.Springs([(0, 1)], k_s=1e4, k_d=2.0), pm.Drag(k=drag, on=[2])])

@@ -155,7 +155,7 @@ class Simulation:
         )
 
     def quantities(self) -> dict[str, float]:
-        """Diagnostics now: energies [J], momentum [kg m/s], largest relative stretch of a spring, how many particles."""
+        """Diagnostics now: energies [J], momentum [kg m/s], largest relative stretch of a spring, particle count."""
         system = self.system
         result = {"particles": float(len(system.particles))}
         if system.order == 2:

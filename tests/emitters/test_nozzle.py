@@ -1,6 +1,7 @@
 """Births: when, where, how fast, for how long, however time is cut."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ NAMES = ("time", "number", "x", "v", "lifetime")
 
 
 def born(nozzle, cuts, seed=0, stream="s"):
-    parts = [nozzle.births(a, b, seed, stream) for a, b in zip(cuts, cuts[1:], strict=False)]
+    parts = [nozzle.births(a, b, seed, stream) for a, b in pairwise(cuts)]
     return {n: np.concatenate([getattr(p, n) for p in parts]) for n in NAMES}
 
 

@@ -37,7 +37,8 @@ def respond_pair(
 ) -> tuple[Array, Array]:
     """Velocities of two balls after they meet.
 
-    The impulse along the line of centres is j = -(1 + e) v_rel . n / (1/m1 + 1/m2). Balls that part are left as they are. Arrays have shape (k, 3), masses are numbers or of shape (k,).
+    The impulse along the line of centres is j = -(1 + e) v_rel . n / (1/m1 + 1/m2). Balls that part are left as they
+    are. Arrays have shape (k, 3), masses are numbers or of shape (k,).
     """
     d = x1 - x2
     size = np.sqrt(rows_dot(d, d))[:, None]

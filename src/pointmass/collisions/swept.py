@@ -2,7 +2,8 @@
 
 A step of the solver gives each particle a cubic (x0, v0, x1, v1). It is split into chords that stay within eps of
 it; the chords' ends and, where a surface bulges between them, its deepest point tell where it is crossed, and the
-crossing is then found on the cubic itself. So nothing tunnels, at any speed, and the time of impact is exact for ballistic motion.
+crossing is then found on the cubic itself. So nothing tunnels, at any speed, and the time of impact is exact for
+ballistic motion.
 """
 
 from __future__ import annotations
