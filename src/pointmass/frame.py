@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.errors import InvalidInput
+from pointmass.errors import InvalidInput, finite_array, number
 
 Floats = NDArray[np.floating[Any]]
 Ints = NDArray[np.integer[Any]]
@@ -176,5 +176,10 @@ class Camera:
     elevation: float = 15.0
 
     def __post_init__(self) -> None:
+        for name in ("position", "target", "up"):
+            if getattr(self, name) is not None:
+                finite_array(f"camera.{name}", getattr(self, name), (3,))
+        for name in ("azimuth", "elevation"):
+            number(f"camera.{name}", getattr(self, name), unit="degrees")
         if not 1.0 < self.fov < 170.0:
             raise InvalidInput(f"camera.fov = {self.fov} is not allowed: it must lie between 1 and 170 degrees")

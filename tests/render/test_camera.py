@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from render_scenes import frame, square
 
+from pointmass.errors import InvalidInput
 from pointmass.frame import Camera, Points, Segments, Triangles
 from pointmass.render import fit_camera
 from pointmass.render.camera import look
@@ -109,3 +110,17 @@ def test_direction_of_an_automatic_camera(azimuth, elevation):
     a, e = np.radians((azimuth, elevation))
     expected = (np.cos(e) * np.sin(a), np.sin(e), np.cos(e) * np.cos(a))
     assert away / np.linalg.norm(away) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"position": (0.0, float("nan"), 0.0)},
+        {"target": (1.0, 2.0)},
+        {"up": (0, float("inf"), 0)},
+        {"azimuth": float("nan")},
+    ],
+)
+def test_a_camera_of_no_numbers_is_refused(values: dict[str, object]) -> None:
+    with pytest.raises(InvalidInput, match=f"camera.{next(iter(values))}"):
+        Camera(**values)  # type: ignore[arg-type]
