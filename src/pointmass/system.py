@@ -76,7 +76,7 @@ class ParticleSystem:
         colliders: Iterable[Collider] | Collider = (),
     ) -> None:
         if not isinstance(particles, Particles):
-            raise InvalidInput(f"particles must be pm.Particles(...), such as a body's .particles, not {particles!r:.60}")
+            raise InvalidInput(f"particles must be Particles, such as a body's .particles, not {particles!r:.60}")
         self.particles = particles
         self.forces = [forces] if isinstance(forces, Force) else list(forces)
         self.colliders = [colliders] if isinstance(colliders, Collider) else list(colliders)

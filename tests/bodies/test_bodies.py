@@ -122,7 +122,7 @@ def test_join_shifts_springs_and_names_groups() -> None:
         (lambda: pm.points([[0, 0, np.nan]]), "x must be finite"),
         (lambda: pm.points([[0, 0, 0]], m=0.0), "m = 0.0 of particle 0"),
         (lambda: pm.points([[0, 0, 0]], pinned=[3]), "rows of particles"),
-        (lambda: pm.points(), "needs the parameter 'x'"),
+        (pm.points, "needs the parameter 'x'"),
     ],
 )
 def test_bad_bodies_are_refused_in_one_sentence(build: object, sentence: str) -> None:

@@ -97,9 +97,7 @@ def test_near_ball_hides_far_ball_in_any_order():
     for order in (slice(None), slice(None, None, -1)):
         places = np.array([[0, 0, 2.0], [0, 0, -2.0]])[order]
         colors = np.array([red, blue])[order]
-        picture = image(
-            frame(places, Points(name="b", radius=0.5, color=colors)), camera=FRONT, size=SIZE, style=BLACK
-        )
+        picture = image(frame(places, Points(name="b", radius=0.5, color=colors)), camera=FRONT, size=SIZE, style=BLACK)
         assert picture[60, 80, 0] > 2 * picture[60, 80, 2]
 
 

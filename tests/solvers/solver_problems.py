@@ -38,9 +38,7 @@ def forced():
     )
 
 
-FORCED_AT_2 = np.array(
-    [(4.0 * np.cos(2.0) - np.cos(4.0)) / 3.0, (-4.0 * np.sin(2.0) + 2.0 * np.sin(4.0)) / 3.0]
-)
+FORCED_AT_2 = np.array([(4.0 * np.cos(2.0) - np.cos(4.0)) / 3.0, (-4.0 * np.sin(2.0) + 2.0 * np.sin(4.0)) / 3.0])
 
 
 def oscillator(omega=1.0, zeta=0.0):
