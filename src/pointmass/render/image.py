@@ -85,11 +85,11 @@ def _light(frame: Frame, camera: Camera, view: View, style: Style) -> tuple[F32,
         tables.add(drawable, frame, view, style.shadows)
     faces, round_ones, lines = tables.joined()
     map_ = shadow(tables.casters, key_direction(style, view)) if tables.casters else no_shadow()
-    from pointmass.render import kernels
+    from pointmass.render import kernels, kernels_shade
 
     draw: Callable[..., bool] = kernels.draw
     height, width = view.height, view.width
-    columns, bands = -(-width // kernels.TILE), -(-height // kernels.BAND)
+    columns, bands = -(-width // kernels_shade.TILE), -(-height // kernels_shade.BAND)
     boxes = np.concatenate((faces.box, round_ones.box, lines.box))
     lists: list[Ints] = []
     for order in _orders((faces, round_ones, lines)):

@@ -7,8 +7,8 @@ threads. A tile's room is small: it stays in the processor's memory, and an empt
 
 Depths are compared as w = 1/z, which is linear in the picture; 0 is infinitely far.
 
-In a tile, `light` has a line of pixels for red, green and blue of each layer, and `depth` one for each sample. Where
-`even` holds, all samples of a pixel have the light of the first layer, and the other layers hold nothing yet.
+A tile has a layer for each sample, see `kernels_shade`. Where `even` holds, all samples of a pixel have the light of
+the first layer, and the other layers hold none yet.
 """
 
 # Numba infers the types of kernels.
@@ -25,13 +25,34 @@ from pointmass.render.balls import MIN_GLOW as _MIN_GLOW
 from pointmass.render.capsules import GLOW_REACH as _REACH
 from pointmass.render.capsules import MIN_GLOW as _MIN_LINE
 from pointmass.render.inner import bare, inner
-from pointmass.render.kernels_shade import HALF, LINES, ONE, STEP, TINY, WAITING, ZERO, clamp, flush, lay, put, unit
+from pointmass.render.kernels_shade import (
+    AREA,
+    BAND,
+    BLOCK,
+    BLUE,
+    DEPTH,
+    GREEN,
+    HALF,
+    LINE,
+    LINES,
+    ONE,
+    RED,
+    STEP,
+    TILE,
+    TINY,
+    WAITING,
+    ZERO,
+    U,
+    V,
+    clamp,
+    flush,
+    put,
+    shown,
+    spread,
+    unit,
+)  # fmt: skip
 
-TILE = 128  # columns of a tile, and
-BAND = 16  # its rows; both even, for the bloom works at half the size
-AREA = TILE * BAND
-LINE = AREA + 48  # a tile's lines in memory: at powers of two they would push each other out of the cache
-
+WIDTH = 8  # pixels that the processor does at once
 HALO = np.float32(_HALO)
 MIN_BALL = np.float32(_MIN_BALL)
 MIN_GLOW = np.float32(_MIN_GLOW)
@@ -103,6 +124,31 @@ def _middle(mask, offsets, samples):
 
 
 @inner
+def _face_spans(corner, y, left, right):
+    """Pixels of a row in which a triangle may have a sample, and those that lie in it whole; y from the corner."""
+    ax, _, vx, vy, wx, wy = corner
+    ux, uy = -vx - wx, -vy - wy
+    v, w = vy * y - vx * ax, wy * y - wx * ax
+    u = 1.0 - v - w
+    x0, x1 = np.int64(left), np.int64(right)
+    x0, x1 = _touching(vx, v + max(vy, 0.0) + max(vx, 0.0), x0, x1)
+    x0, x1 = _touching(wx, w + max(wy, 0.0) + max(wx, 0.0), x0, x1)
+    x0, x1 = _touching(ux, u + max(uy, 0.0) + max(ux, 0.0), x0, x1)
+    within0, within1 = _inside(vx, v + min(vy, 0.0) + min(vx, 0.0), x0, x1)
+    within0, within1 = _inside(wx, w + min(wy, 0.0) + min(wx, 0.0), within0, within1)
+    within0, within1 = _inside(ux, u + min(uy, 0.0) + min(ux, 0.0), within0, within1)
+    return x0, x1, within0, within1
+
+
+@inner
+def _covers(corner, x, y):
+    """Whether a pixel coordinate lies in a triangle."""
+    ax, ay, vx, vy, wx, wy = corner
+    v, w = vx * (x - ax) + vy * (y - ay), wx * (x - ax) + wy * (y - ay)
+    return v >= 0.0 and w >= 0.0 and v + w <= 1.0
+
+
+@inner
 def _face(t, box, area, solid, tile, count, camera, offsets, steps):
     """One triangle: each sample in front is replaced (solid) or laid over; `steps` is a number for each sample."""
     ax, ay = np.float64(t[0]), np.float64(t[1])
@@ -112,73 +158,74 @@ def _face(t, box, area, solid, tile, count, camera, offsets, steps):
         return count
     # Barycentric coordinates of b and c are linear: vx (x - ax) + vy (y - ay). So is 1/z.
     vx, vy, wx, wy = cy / twice, -cx / twice, -by / twice, bx / twice
-    ux, uy = -vx - wx, -vy - wy
     nearer_b, nearer_c = np.float64(t[7]) - t[6], np.float64(t[8]) - t[6]
     zx, zy = vx * nearer_b + wx * nearer_c, vy * nearer_b + wy * nearer_c
     # Corners turn counter-clockwise seen from outside, and pixels count downwards.
     side = ONE if twice < 0.0 else -ONE
-    depth, waiting, spots, samples = tile[1], tile[3], tile[4], tile[6]
+    cells, waiting, spots, samples = tile[1], tile[3], tile[4], tile[6]
     z0 = t[6] - zx * ax - zy * ay
+    corner, begun = (ax, ay, vx, vy, wx, wy), count
     for k in range(samples):
         steps[k] = zx * offsets[k, 0] + zy * offsets[k, 1]
     left, right, first, last = _cut(box, area)
     for row in range(first, last):
         y = row - ay
-        v0, w0 = vy * y - vx * ax, wy * y - wx * ax
-        u0 = 1.0 - v0 - w0
-        x0, x1 = np.int64(left), np.int64(right)
-        x0, x1 = _touching(vx, v0 + max(vy, 0.0) + max(vx, 0.0), x0, x1)
-        x0, x1 = _touching(wx, w0 + max(wy, 0.0) + max(wx, 0.0), x0, x1)
-        x0, x1 = _touching(ux, u0 + max(uy, 0.0) + max(ux, 0.0), x0, x1)
-        within0, within1 = _inside(vx, v0 + min(vy, 0.0) + min(vx, 0.0), x0, x1)
-        within0, within1 = _inside(wx, w0 + min(wy, 0.0) + min(wx, 0.0), within0, within1)
-        within0, within1 = _inside(ux, u0 + min(uy, 0.0) + min(ux, 0.0), within0, within1)
+        x0, x1, within0, within1 = _face_spans(corner, y, left, right)
         start = _place(row, area)
         for column in range(x0, x1):
             mask = 0
             p = start + column
-            if within0 <= column < within1:
-                near = z0 + zx * column + zy * row
-                for k in range(samples):
-                    if near + steps[k] > depth[k, p]:
-                        if solid:
-                            depth[k, p] = near + steps[k]
-                        mask |= 1 << k
-            else:
-                for k in range(samples):
-                    px, py = column + offsets[k, 0] - ax, row + offsets[k, 1] - ay
-                    v, w = vx * px + vy * py, wx * px + wy * py
-                    if v >= 0.0 and w >= 0.0 and v + w <= 1.0:
-                        near = t[6] + zx * px + zy * py
-                        if near > depth[k, p]:
-                            if solid:
-                                depth[k, p] = near
-                            mask |= 1 << k
+            near = np.float32(z0 + zx * column + zy * row)
+            within = within0 <= column < within1
+            for k in range(samples):
+                if not near + steps[k] > cells[k, DEPTH, p]:
+                    continue
+                if within or _covers(corner, column + offsets[k, 0], row + offsets[k, 1]):
+                    mask |= 1 << k
+                    if solid:
+                        cells[k, DEPTH, p] = near + steps[k]
             if mask == 0:
                 continue
-            px, py = _middle(mask, offsets, samples)
-            px, py = px + column - ax, py + row - ay
-            v, w = np.float32(vx * px + vy * py), np.float32(wx * px + wy * py)
-            u = (ONE - v - w) * t[6]
-            v, w = v * t[7], w * t[8]
-            z = ONE / (u + v + w)
-            u, v, w = u * z, v * z, w * z
-            dx, dy = _ray(np.float32(px + ax), np.float32(py + ay), camera)
             if count == WAITING:
-                count = flush(tile, count)
+                _put_faces(t, begun, count, waiting, corner, side, solid, camera)
+                begun = count = flush(tile, count)
+            px, py = _middle(mask, offsets, samples)
             spots[0, count], spots[1, count] = p, mask
-            put(
-                waiting, count, dx * z, dy * z, z,
-                side * (u * t[9] + v * t[12] + w * t[15]),
-                side * (u * t[10] + v * t[13] + w * t[16]),
-                side * (u * t[11] + v * t[14] + w * t[17]),
-                u * t[18] + v * t[22] + w * t[26],
-                u * t[19] + v * t[23] + w * t[27],
-                u * t[20] + v * t[24] + w * t[28],
-                GLOSS_MESH, ONE if solid else clamp(u * t[21] + v * t[25] + w * t[29], ZERO, ONE), ZERO, ZERO,
-            )  # fmt: skip
+            waiting[U + count], waiting[V + count] = px + column, py + row
             count += 1
+    _put_faces(t, begun, count, waiting, corner, side, solid, camera)
     return count
+
+
+@inner
+def _put_faces(t, first, last, waiting, corner, side, solid, camera):
+    """What a triangle shows at the places (U, V) of the fragments [first, last)."""
+    ax, ay, vx, vy, wx, wy = corner
+    t0, t1, t2 = t[6], t[7], t[8]
+    nx0, ny0, nz0, nx1, ny1, nz1, nx2, ny2, nz2 = t[9], t[10], t[11], t[12], t[13], t[14], t[15], t[16], t[17]
+    r0, g0, b0, a0, r1, g1, b1, a1 = t[18], t[19], t[20], t[21], t[22], t[23], t[24], t[25]
+    r2, g2, b2, a2 = t[26], t[27], t[28], t[29]
+    least = ONE if solid else ZERO
+    inverse, middle_x, middle_y = camera[3], camera[1], camera[2]
+    line = waiting[first:]  # or the compiler would not know that what it counts from is not negative
+    for i in range(last - first):
+        px, py = line[U + i], line[V + i]
+        x, y = px - ax, py - ay
+        v, w = np.float32(vx * x + vy * y), np.float32(wx * x + wy * y)
+        u = (ONE - v - w) * t0
+        v, w = v * t1, w * t2
+        z = ONE / (u + v + w)
+        u, v, w = u * z, v * z, w * z
+        put(
+            line, i, (px - middle_x) * inverse * z, (middle_y - py) * inverse * z, z,
+            side * (u * nx0 + v * nx1 + w * nx2),
+            side * (u * ny0 + v * ny1 + w * ny2),
+            side * (u * nz0 + v * nz1 + w * nz2),
+            u * r0 + v * r1 + w * r2,
+            u * g0 + v * g1 + w * g2,
+            u * b0 + v * b1 + w * b2,
+            GLOSS_MESH, clamp(u * a0 + v * a1 + w * a2, least, ONE), ZERO, ZERO,
+        )  # fmt: skip
 
 
 @inner
@@ -212,7 +259,7 @@ def _put_ball(c, dx, dy, alpha, w, sharp, tile, count, p, mask):
 
 @inner
 def _ball_solid(c, box, area, tile, count, camera, offsets):
-    depth, samples = tile[1], tile[6]
+    cells, samples = tile[1], tile[6]
     left, right, first, last = _cut(box, area)
     for row in range(first, last):
         start = _place(row, area)
@@ -226,8 +273,8 @@ def _ball_solid(c, box, area, tile, count, camera, offsets):
                 rest = c[3] * c[3] - px * px - py * py - pz * pz
                 if rest > ZERO:
                     near = ONE / (along - math.sqrt(rest / square))
-                    if near > depth[k, p]:
-                        depth[k, p] = near
+                    if near > cells[k, DEPTH, p]:
+                        cells[k, DEPTH, p] = near
                         mask |= 1 << k
                         hits += 1
                         sx += dx
@@ -260,9 +307,14 @@ def _ball_soft(c, box, area, tile, count, camera):
 
 
 @inner
-def _ball_glow(c, box, area, tile, camera):
+def _glow_span(left, x0, x1):
+    """Pixels [x0, x1) of a tile whose first column is `left`, up to whole blocks that the processor does at once."""
+    return left + (x0 - left) // WIDTH * WIDTH, left + (x1 - left + WIDTH - 1) // WIDTH * WIDTH
+
+
+@inner
+def _ball_glow(c, box, area, room, ramp, camera):
     """A bright core in a faint halo: with u = 1 - d^2, u^3 (u^6 + 0.15) is close to two Gaussians, but has an end."""
-    light, depth, even, layers, hidden = tile[0], tile[1], tile[2], tile[5], tile[7]
     w = ONE / c[2]
     full = HALO * camera[0] * w * c[3]
     reach = max(full, MIN_GLOW)
@@ -270,17 +322,24 @@ def _ball_glow(c, box, area, tile, camera):
     sharp = c[2] * c[2] / c[3]
     x, y = camera[1] + camera[0] * w * c[0], camera[2] - camera[0] * w * c[1]
     inverse = ONE / (reach * reach)
+    r, g, b = c[4], c[5], c[6]
     left, right, first, last = _cut(box, area)
     for row in range(first, last):
         ey = np.float32(row) + HALF - y
-        start = _place(row, area)
-        for column in range(left, right):
-            ex = np.float32(column) + HALF - x
-            rest = ONE - (ex * ex + ey * ey) * inverse
-            if rest > ZERO:
-                cube = rest * rest * rest
-                f = strength * cube * (cube * cube + SKIRT)
-                lay(light, depth, even, hidden, layers, start + column, w, sharp, f * c[4], f * c[5], f * c[6], ZERO)
+        half = math.sqrt(max(reach * reach - ey * ey, ZERO)) + ONE
+        x0 = max(left, np.int64(math.floor(x - half)))
+        x0, x1 = _glow_span(area[0], x0, max(x0, min(right, np.int64(math.ceil(x + half)))))
+        line = room[_place(row, area) + x0 :]
+        before = np.float32(x0) - x
+        for i in range(x1 - x0):
+            ex = before + ramp[i]
+            rest = max(ONE - (ex * ex + ey * ey) * inverse, ZERO)
+            cube = rest * rest * rest
+            f = strength * cube * (cube * cube + SKIRT)
+            f *= shown(line, i, w, sharp)
+            line[RED + i] += f * r
+            line[GREEN + i] += f * g
+            line[BLUE + i] += f * b
 
 
 @inner
@@ -327,7 +386,7 @@ def _put_line(c, t, radius, z, px, py, alpha, w, sharp, camera, tile, count, p, 
 
 @inner
 def _capsule_solid(c, box, area, tile, count, camera, offsets):
-    depth, samples = tile[1], tile[6]
+    cells, samples = tile[1], tile[6]
     wa, wb = ONE / c[2], ONE / c[5]
     ra, rb = camera[0] * c[6] * wa, camera[0] * c[7] * wb
     dx, dy = c[10] - c[8], c[11] - c[9]
@@ -349,8 +408,8 @@ def _capsule_solid(c, box, area, tile, count, camera, offsets):
                     # The surface bulges towards the eye by a part of the radius.
                     bulge = math.sqrt(ONE - off / square) * min(radius * camera[3], HALF)
                     near = (wa + t * (wb - wa)) / (ONE - bulge)
-                    if near > depth[k, p]:
-                        depth[k, p] = near
+                    if near > cells[k, DEPTH, p]:
+                        cells[k, DEPTH, p] = near
                         mask |= 1 << k
                         hits += 1
                         sx += px
@@ -379,18 +438,15 @@ def _capsule_span(c, y, reach, left, right):
 
 @inner
 def _capsule_soft(c, box, area, tile, count, camera):
-    """A thin, clear or glowing line; thinner than a pixel it fades instead."""
-    light, depth, even, layers, hidden = tile[0], tile[1], tile[2], tile[5], tile[7]
-    glow = c[24] > ZERO
+    """A thin or clear line; thinner than a pixel it fades instead."""
     wa, wb = ONE / c[2], ONE / c[5]
     ra, rb = camera[0] * c[6] * wa, camera[0] * c[7] * wb
     dx, dy = c[10] - c[8], c[11] - c[9]
     inverse = ONE / max(dx * dx + dy * dy, TINY)
-    widest = max(REACH * max(ra, rb), MIN_LINE) if glow else max(ra, rb) + ONE
     left, right, first, last = _cut(box, area)
     for row in range(first, last):
         py = np.float32(row) + HALF
-        x0, x1 = _capsule_span(c, py, widest, left, right)
+        x0, x1 = _capsule_span(c, py, max(ra, rb) + ONE, left, right)
         start = _place(row, area)
         for column in range(x0, x1):
             px = np.float32(column) + HALF
@@ -398,43 +454,79 @@ def _capsule_soft(c, box, area, tile, count, camera):
             if off < ZERO:
                 continue
             radius = ra + t * (rb - ra)
+            shown = max(radius, HALF)
             alpha = c[15] + t * (c[19] - c[15])
-            if glow:
-                full = REACH * radius
-                reach = max(full, MIN_LINE)
-                rest = reach * reach - off
-                if rest > ZERO:
-                    rest /= reach * reach
-                    f = alpha * full / reach * rest * rest * rest
-                    r, g, b = c[12] + t * (c[16] - c[12]), c[13] + t * (c[17] - c[13]), c[14] + t * (c[18] - c[14])
-                    w = wa + t * (wb - wa)
-                    sharp = camera[0] / (w * max(radius, HALF))
-                    lay(light, depth, even, hidden, layers, start + column, w, sharp, f * r, f * g, f * b, ZERO)
-            else:
-                shown = max(radius, HALF)
-                alpha *= radius / shown * clamp(shown + HALF - math.sqrt(off), ZERO, ONE)
-                if alpha > ZERO:
-                    w = wa + t * (wb - wa)
-                    z = ONE / w
-                    sharp = z * camera[0] / shown
-                    count = _put_line(c, t, radius, z, px, py, alpha, w, sharp, camera, tile, count, start + column, 0)
+            alpha *= radius / shown * clamp(shown + HALF - math.sqrt(off), ZERO, ONE)
+            if alpha > ZERO:
+                w = wa + t * (wb - wa)
+                z = ONE / w
+                sharp = z * camera[0] / shown
+                count = _put_line(c, t, radius, z, px, py, alpha, w, sharp, camera, tile, count, start + column, 0)
     return count
 
 
 @inner
-def _fill(light, depth, even, area, samples, colors):
+def _capsule_glow(c, box, area, room, ramp, camera):
+    """A glowing line; thinner than MIN_LINE pixels it fades instead."""
+    wa, wb = ONE / c[2], ONE / c[5]
+    focal = camera[0]
+    ra, rb = focal * c[6] * wa, focal * c[7] * wb
+    wider, farther = rb - ra, wb - wa
+    ax, ay, dx, dy = c[8], c[9], c[10] - c[8], c[11] - c[9]
+    inverse = ONE / max(dx * dx + dy * dy, TINY)
+    ux, uy, vx, vy = c[20], c[21], c[22], c[23]
+    beyond = ONE if vx == ZERO and vy == ZERO else ZERO  # a line that is not there cuts nothing
+    r, g, b, alpha = c[12], c[13], c[14], c[15]
+    more_r, more_g, more_b, more_alpha = c[16] - r, c[17] - g, c[18] - b, c[19] - alpha
+    left, right, first, last = _cut(box, area)
+    for row in range(first, last):
+        py = np.float32(row) + HALF
+        x0, x1 = _capsule_span(c, py, max(REACH * max(ra, rb), MIN_LINE), left, right)
+        x0, x1 = _glow_span(area[0], x0, x1)
+        line = room[_place(row, area) + x0 :]
+        before, ey = np.float32(x0) - ax, py - ay
+        for i in range(x1 - x0):
+            ex = before + ramp[i]
+            t = clamp((ex * dx + ey * dy) * inverse, ZERO, ONE)
+            ox, oy = ex - t * dx, ey - t * dy
+            radius = ra + t * wider
+            reach = max(REACH * radius, MIN_LINE)
+            shrunk = ONE / reach
+            rest = max(ONE - (ox * ox + oy * oy) * shrunk * shrunk, ZERO)
+            w = wa + t * farther
+            f = (alpha + t * more_alpha) * REACH * radius * shrunk * rest * rest * rest
+            f *= shown(line, i, w, focal / (w * max(radius, HALF)))
+            outside = ex * ux + ey * uy < ZERO or (ex - dx) * vx + (ey - dy) * vy >= beyond
+            f = ZERO if outside else f
+            line[RED + i] += f * (r + t * more_r)
+            line[GREEN + i] += f * (g + t * more_g)
+            line[BLUE + i] += f * (b + t * more_b)
+
+
+@inner
+def _fill(cells, even, area, samples, colors):
     """A tile with nothing in it."""
     for row in range(area[2], area[3]):
         start = (row - area[2]) * TILE
         for channel in range(3):
-            light[channel, start : start + TILE] = colors[row, channel]
+            cells[0, channel, start : start + TILE] = colors[row, channel]
     for k in range(samples):
-        depth[k, :AREA] = ZERO
+        for line in range(DEPTH, DEPTH + 3):
+            cells[k, line, :AREA] = ZERO
     even[:] = True
 
 
 @inner
-def _mix(light, even, samples):
+def _part(cells, even, samples):
+    """Every sample becomes a layer of its own."""
+    for p in range(AREA):
+        spread(cells, even, p, samples)
+    for k in range(samples):
+        cells[k, DEPTH + 1, :AREA] = cells[k, DEPTH, :AREA]
+
+
+@inner
+def _mix(cells, even, samples):
     """The mean of each pixel's samples into the first layer."""
     share = ONE / np.float32(samples)
     for p in range(AREA):
@@ -442,33 +534,34 @@ def _mix(light, even, samples):
             for channel in range(3):
                 total = ZERO
                 for k in range(samples):
-                    total += light[3 * k + channel, p]
-                light[channel, p] = share * total
+                    total += cells[k, channel, p]
+                cells[0, channel, p] = share * total
 
 
 @inner
-def _resolve(depth, samples):
-    """The depths of each pixel into three lines: the nearest, the farthest, and the share of the nearest.
+def _resolve(cells, samples):
+    """The depths of each pixel into the first layer: the nearest, the farthest, and the share of the nearest.
 
     As if there were two surfaces: then the mean tells how much of the pixel the nearer one covers.
     """
     share = ONE / np.float32(samples)
     for p in range(AREA):
-        near = far = total = depth[0, p]
+        near = far = total = cells[0, DEPTH, p]
         for k in range(1, samples):
-            near, far, total = max(near, depth[k, p]), min(far, depth[k, p]), total + depth[k, p]
-        depth[0, p], depth[1, p] = near, far
-        depth[2, p] = clamp((total * share - far) / (near - far), ZERO, ONE) if near > far else ZERO
+            deep = cells[k, DEPTH, p]
+            near, far, total = max(near, deep), min(far, deep), total + deep
+        cells[0, DEPTH, p], cells[0, DEPTH + 1, p] = near, far
+        cells[0, DEPTH + 2, p] = clamp((total * share - far) / (near - far), ZERO, ONE) if near > far else ZERO
 
 
 @inner
-def _hand_over(light, area, picture, bright):
+def _hand_over(cells, area, picture, bright):
     """A tile into the picture, and what is brighter than the knee, at half the size; whether there is any."""
     left, right, top, bottom = area
     for channel in range(3):
         for row in range(top, bottom):
             start = (row - top) * TILE
-            picture[channel, row, left:right] = light[channel, start : start + right - left]
+            picture[channel, row, left:right] = cells[0, channel, start : start + right - left]
     spilled = False
     for row in range(top // 2, (bottom + 1) // 2):
         for column in range(left // 2, (right + 1) // 2):
@@ -476,12 +569,12 @@ def _hand_over(light, area, picture, bright):
             for j in range(2):
                 for i in range(2):
                     p = (min(2 * row + j, bottom - 1) - top) * TILE + min(2 * column + i, right - 1) - left
-                    most = max(light[0, p], light[1, p], light[2, p])
+                    most = max(cells[0, 0, p], cells[0, 1, p], cells[0, 2, p])
                     if most > KNEE:
                         share = np.float32(0.25) * (min(most, HOTTEST) - KNEE) / most
-                        r += share * light[0, p]
-                        g += share * light[1, p]
-                        b += share * light[2, p]
+                        r += share * cells[0, 0, p]
+                        g += share * cells[0, 1, p]
+                        b += share * cells[0, 2, p]
                         spilled = True
             bright[0, row, column], bright[1, row, column], bright[2, row, column] = r, g, b
     return spilled
@@ -513,6 +606,45 @@ def sort_into_tiles(box, columns, rows):
     return starts, lists
 
 
+@inner
+def _any_below(items, bound):
+    return len(items) > 0 and items.min() < bound
+
+
+@inner
+def _draw_all(items, solid, tables, area, tile, space):
+    """The things of a tile, in their order."""
+    faces, face_box, balls, ball_box, capsules, capsule_box = tables
+    camera, offsets, steps, ramp = space
+    room, layers = tile[0], tile[5]
+    capsule_first = len(faces) + len(balls)
+    count = 0
+    for item in items:
+        if item < len(faces):
+            count = _face(faces[item], face_box[item], area, solid, tile, count, camera, offsets, steps)
+        elif item < capsule_first:
+            ball, box = balls[item - len(faces)], ball_box[item - len(faces)]
+            if solid:
+                count = _ball_solid(ball, box, area, tile, count, camera, offsets)
+            elif ball[8] > ZERO:
+                count = flush(tile, count)  # what lies behind the glow
+                for k in range(layers):
+                    _ball_glow(ball, box, area, room[k * BLOCK :], ramp, camera)
+            else:
+                count = _ball_soft(ball, box, area, tile, count, camera)
+        else:
+            line, box = capsules[item - capsule_first], capsule_box[item - capsule_first]
+            if solid:
+                count = _capsule_solid(line, box, area, tile, count, camera, offsets)
+            elif line[24] > ZERO:
+                count = flush(tile, count)
+                for k in range(layers):
+                    _capsule_glow(line, box, area, room[k * BLOCK :], ramp, camera)
+            else:
+                count = _capsule_soft(line, box, area, tile, count, camera)
+    flush(tile, count)
+
+
 @njit(nogil=True, cache=True, error_model="numpy")
 def draw(
     band, picture, bright, background, camera, offsets, solid_starts, solids, soft_starts, softs,
@@ -535,63 +667,41 @@ def draw(
     shadow, matrix : the shadow map.
     """
     height, width = picture.shape[1], picture.shape[2]
-    room = np.empty((3 * len(offsets), LINE), dtype=np.float32)
-    deep = np.empty((max(3, len(offsets)), LINE), dtype=np.float32)
-    flags = np.empty(AREA, dtype=np.bool_)
-    steps = np.empty(len(offsets), dtype=np.float32)
-    table = np.empty(LINES * STEP, dtype=np.float32)
-    places = np.empty((2, WAITING), dtype=np.int64)
-    light, depth, even, waiting, spots = bare(room), bare(deep), bare(flags), bare(table), bare(places)
     picture, bright, background = bare(picture), bare(bright), bare(background)
     camera, offsets, lamp, shadow, matrix = bare(camera), bare(offsets), bare(lamp), bare(shadow), bare(matrix)
-    faces, balls, capsules = bare(faces), bare(balls), bare(capsules)
-    face_box, ball_box, capsule_box = bare(face_box), bare(ball_box), bare(capsule_box)
-    ball_first, capsule_first = len(faces), len(faces) + len(balls)
+    tables = (bare(faces), bare(face_box), bare(balls), bare(ball_box), bare(capsules), bare(capsule_box))
+    most = len(offsets)
+    owners = (
+        np.empty(most * BLOCK, dtype=np.float32),
+        np.empty(AREA, dtype=np.bool_),
+        np.empty(LINES * STEP, dtype=np.float32),
+        np.empty((2, WAITING), dtype=np.int64),
+        np.empty(most, dtype=np.float32),
+        (np.arange(TILE) + 0.5).astype(np.float32),
+    )
+    room, even, waiting, spots = bare(owners[0]), bare(owners[1]), bare(owners[2]), bare(owners[3])
+    cells = room.reshape((most, BLOCK // LINE, LINE))
+    space = (camera, offsets, bare(owners[4]), bare(owners[5]))
     columns = (width + TILE - 1) // TILE
     spilled = False
     for column in range(columns):
         area = (column * TILE, min((column + 1) * TILE, width), band * BAND, min((band + 1) * BAND, height))
         at = band * columns + column
-        layered = False  # clear faces need the samples apart until the end
-        for i in range(soft_starts[at], soft_starts[at + 1]):
-            layered |= softs[i] < ball_first
-        hidden = solid_starts[at] < solid_starts[at + 1]
-        samples = len(offsets) if hidden or layered else 1
-        layered &= samples > 1
-        _fill(light, depth, even, area, samples, background)
-        for phase in range(2):
-            solid = phase == 0
-            tile = (light, depth, even, waiting, spots, samples, samples, hidden, lamp, shadow, matrix)
-            if not solid and not layered:
-                if hidden:
-                    _mix(light, even, samples)
-                    _resolve(depth, samples)
-                tile = (light, depth, even, waiting, spots, 1, samples, hidden, lamp, shadow, matrix)
-            first, last = (solid_starts[at], solid_starts[at + 1]) if solid else (soft_starts[at], soft_starts[at + 1])
-            count = 0
-            for i in range(first, last):
-                item = solids[i] if solid else softs[i]
-                if item < ball_first:
-                    count = _face(faces[item], face_box[item], area, solid, tile, count, camera, offsets, steps)
-                elif item < capsule_first:
-                    ball, box = balls[item - ball_first], ball_box[item - ball_first]
-                    if solid:
-                        count = _ball_solid(ball, box, area, tile, count, camera, offsets)
-                    elif ball[8] > ZERO:
-                        count = flush(tile, count)  # what lies behind the glow
-                        _ball_glow(ball, box, area, tile, camera)
-                    else:
-                        count = _ball_soft(ball, box, area, tile, count, camera)
-                else:
-                    line, box = capsules[item - capsule_first], capsule_box[item - capsule_first]
-                    if solid:
-                        count = _capsule_solid(line, box, area, tile, count, camera, offsets)
-                    else:
-                        if line[24] > ZERO:
-                            count = flush(tile, count)
-                        count = _capsule_soft(line, box, area, tile, count, camera)
-            flush(tile, count)
+        front, back = solids[solid_starts[at] : solid_starts[at + 1]], softs[soft_starts[at] : soft_starts[at + 1]]
+        layered = most > 1 and _any_below(back, len(faces))  # clear faces need the samples apart until the end
+        samples = most if layered or len(front) > 0 else 1
+        layers = samples if layered else 1
+        _fill(cells, even, area, samples, background)
+        # First what hides, then what is laid over: one walk is compiled for both.
+        for solid in (True, False):
+            if not solid and layered:
+                _part(cells, even, samples)
+            elif not solid and samples > 1:
+                _mix(cells, even, samples)
+                _resolve(cells, samples)
+            tile = (room, cells, even, waiting, spots, layers, samples, lamp, shadow, matrix)
+            _draw_all(front if solid else back, solid, tables, area, tile, space)
         if layered:
-            _mix(light, even, samples)
-        spilled |= _hand_over(light, area, picture, bright)
+            _mix(cells, even, samples)
+        spilled |= _hand_over(cells, area, picture, bright)
     return spilled

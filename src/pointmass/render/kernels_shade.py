@@ -14,12 +14,22 @@ import numpy as np
 
 from pointmass.render.inner import inner
 
+TILE = 128  # columns of a tile, and
+BAND = 16  # its rows; both even, for the bloom works at half the size
+AREA = TILE * BAND
+LINE = AREA + 48  # a tile's lines in memory: at powers of two they would push each other out of the cache
+# A layer of a tile: a line each for red, green and blue; for 1/z, first of a sample, later the nearest; for the
+# farthest; and for the share of the nearest.
+RED, GREEN, BLUE, NEAR, FAR, COVER = (LINE * line for line in range(6))
+BLOCK = 6 * LINE  # from layer to layer
+DEPTH = 3  # the line of 1/z
+
 WAITING = 512  # fragments that the table holds: few enough to stay in the processor's nearest memory
 STEP = WAITING + 16  # from line to line: at powers of two they would push each other out of the cache
 LINES = 17
 # Where the line of each number starts: the place, the normal (of any length), the colour, how much it shines, its
 # alpha, the 1/z by which it is hidden, how sharply; then room for the place in the shadow map and the share of light.
-X, Y, Z, NX, NY, NZ, R, G, B, GLOSS, ALPHA, W, SHARP, U, V, FAR, LIT = (STEP * line for line in range(LINES))
+X, Y, Z, NX, NY, NZ, R, G, B, GLOSS, ALPHA, W, SHARP, U, V, DEEP, LIT = (STEP * line for line in range(LINES))
 
 # Wrapped, or every product with them would be in double precision.
 ZERO = np.float32(0.0)
@@ -55,32 +65,17 @@ def put(waiting, i, x, y, z, nx, ny, nz, r, g, b, gloss, alpha, w, sharp):
 
 
 @inner
-def lay(light, depth, even, hidden, layers, p, w, sharp, r, g, b, alpha):
-    """Lay premultiplied light with an alpha (0: it only adds) over every layer of a pixel, where it is in front.
-
-    It fades over the thickness that `sharp` stands for.
-    """
-    if layers > 1:
-        _spread(light, even, p, layers)
-    for k in range(layers):
-        share = ONE
-        if hidden:
-            # One layer for all samples: its depths were resolved into nearest, farthest and the share of the nearest.
-            far = depth[1, p] if layers == 1 else depth[k, p]
-            share = clamp((w - far) * sharp + ONE, ZERO, ONE)
-            if layers == 1 and share > ZERO and depth[2, p] > ZERO:
-                share += depth[2, p] * (clamp((w - depth[0, p]) * sharp + ONE, ZERO, ONE) - share)
-        if share > ZERO:
-            keep = ONE - alpha * share
-            light[3 * k, p] = keep * light[3 * k, p] + share * r
-            light[3 * k + 1, p] = keep * light[3 * k + 1, p] + share * g
-            light[3 * k + 2, p] = keep * light[3 * k + 2, p] + share * b
+def shown(line, i, w, sharp):
+    """Share of a pixel that lies behind w; it fades over the thickness that `sharp` stands for."""
+    far = clamp((w - line[FAR + i]) * sharp + ONE, ZERO, ONE)
+    near = clamp((w - line[NEAR + i]) * sharp + ONE, ZERO, ONE)
+    return far + line[COVER + i] * (near - far)
 
 
 @inner
 def flush(tile, count):
     """Light the fragments that wait, and lay them into the tile; 0, which is how many wait then."""
-    light, depth, even, waiting, spots, layers, samples, hidden, lamp, shadow, matrix = tile
+    room, cells, even, waiting, spots, layers, samples, lamp, shadow, matrix = tile
     if count > 0:
         _look_up(waiting, count, lamp, shadow, matrix)
         _shade(waiting, count, lamp)
@@ -89,28 +84,30 @@ def flush(tile, count):
         p, mask, alpha = spots[0, i], spots[1, i], waiting[ALPHA + i]
         r, g, b = waiting[R + i], waiting[G + i], waiting[B + i]
         if mask == full and alpha == ONE:
-            light[0, p], light[1, p], light[2, p] = r, g, b
+            cells[0, 0, p], cells[0, 1, p], cells[0, 2, p] = r, g, b
             even[p] = True
-        elif mask == 0:
-            w, sharp = waiting[W + i], waiting[SHARP + i]
-            lay(light, depth, even, hidden, layers, p, w, sharp, alpha * r, alpha * g, alpha * b, alpha)
-        else:
-            _spread(light, even, p, samples)
-            for k in range(samples):
-                if mask & (1 << k):
-                    light[3 * k, p] += alpha * (r - light[3 * k, p])
-                    light[3 * k + 1, p] += alpha * (g - light[3 * k + 1, p])
-                    light[3 * k + 2, p] += alpha * (b - light[3 * k + 2, p])
+            continue
+        if mask != 0:
+            spread(cells, even, p, samples)
+        for k in range(samples if mask != 0 else layers):
+            share = alpha
+            if mask == 0:
+                share *= shown(room, k * BLOCK + p, waiting[W + i], waiting[SHARP + i])
+            elif not mask & (1 << k):
+                continue
+            cells[k, 0, p] += share * (r - cells[k, 0, p])
+            cells[k, 1, p] += share * (g - cells[k, 1, p])
+            cells[k, 2, p] += share * (b - cells[k, 2, p])
     return 0
 
 
 @inner
-def _spread(light, even, p, samples):
+def spread(cells, even, p, samples):
     """Give each sample of a pixel its own light, before they part."""
     if even[p]:
         for k in range(1, samples):
             for channel in range(3):
-                light[3 * k + channel, p] = light[channel, p]
+                cells[k, channel, p] = cells[0, channel, p]
         even[p] = False
 
 
@@ -128,11 +125,11 @@ def _look_up(waiting, count, lamp, shadow, matrix):
         x, y, z = waiting[X + i] + off * (nx + lx), waiting[Y + i] + off * (ny + ly), waiting[Z + i] + off * (nz + lz)
         waiting[U + i] = ux * x + uy * y + uz * z + u0
         waiting[V + i] = vx * x + vy * y + vz * z + v0
-        waiting[FAR + i] = fx * x + fy * y + fz * z + f0
+        waiting[DEEP + i] = fx * x + fy * y + fz * z + f0
         waiting[LIT + i] = max(ZERO, (nx * lx + ny * ly + nz * lz + WRAP) / (ONE + WRAP))
     for i in range(count):
         if waiting[LIT + i] > ZERO:
-            waiting[LIT + i] = _lit(waiting[U + i], waiting[V + i], waiting[FAR + i], shadow)
+            waiting[LIT + i] = _lit(waiting[U + i], waiting[V + i], waiting[DEEP + i], shadow)
 
 
 @inner

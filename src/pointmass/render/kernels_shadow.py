@@ -15,6 +15,7 @@ ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 HALF = np.float32(0.5)
 TINY = np.float32(1e-12)
+STEEP = np.float32(1e-3)  # [texels] a line that rises less has no slope
 
 
 @inner
@@ -58,14 +59,23 @@ def _cast_face(depth, r0, r1, c):
 def _cast_capsule(depth, r0, r1, ax, ay, az, ra, bx, by, bz, rb):
     """A capsule seen across; a ball is one without length."""
     dx, dy = bx - ax, by - ay
-    square = max(dx * dx + dy * dy, TINY)
+    inverse = ONE / max(dx * dx + dy * dy, TINY)
+    reach = max(ra, rb)
     y0, y1 = _span(min(ay - ra, by - rb), max(ay + ra, by + rb), r0, r1)
-    x0, x1 = _span(min(ax - ra, bx - rb), max(ax + ra, bx + rb), 0, depth.shape[1])
+    left, right = min(ax - ra, bx - rb), max(ax + ra, bx + rb)
+    steep = abs(dy) > STEEP
+    slope = dx / dy if steep else ZERO
+    half = reach * math.sqrt(ONE + slope * slope) + ONE
     for row in range(y0, y1):
         y = np.float32(row) + HALF
+        low, high = left, right
+        if steep:  # a row meets only a part of a slanted line
+            middle = ax + (y - ay) * slope
+            low, high = max(left, middle - half), min(right, middle + half)
+        x0, x1 = _span(low, high, 0, depth.shape[1])
         for column in range(x0, x1):
             x = np.float32(column) + HALF
-            t = _clamp(((x - ax) * dx + (y - ay) * dy) / square, ZERO, ONE)
+            t = _clamp(((x - ax) * dx + (y - ay) * dy) * inverse, ZERO, ONE)
             radius = ra + t * (rb - ra)
             ex, ey = x - ax - t * dx, y - ay - t * dy
             rest = radius * radius - ex * ex - ey * ey
