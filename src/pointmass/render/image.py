@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,17 +98,30 @@ def _light(frame: Frame, camera: Camera, view: View, style: Style) -> tuple[F32,
         lists += [starts, order[places]]
     light = np.empty((3, height, width), dtype=np.float32)
     bright = np.empty((3, (height + 1) // 2, (width + 1) // 2), dtype=np.float32)
-    background = _gradient(style, height)
     middle = np.array((view.focal, 0.5 * width, 0.5 * height, 1.0 / view.focal), dtype=np.float32)
+    pictures = (light, bright, _gradient(style, height), middle)
     things = [part for table in (faces, round_ones, lines) for part in (table.rows, table.box)]
     light_from = (lamp(style, view, camera, map_), map_.depth, map_.matrix)
     spilled = np.zeros(bands, dtype=bool)
 
     def band(i: int) -> None:
-        spilled[i] = draw(i, light, bright, background, middle, _offsets(style.samples), *lists, *things, *light_from)
+        spilled[i] = draw(i, *pictures, _offsets(style.samples), *lists, *things, *light_from, *_room(style.samples**2))
 
     each(band, bands)
     return light, bright if spilled.any() else None
+
+
+def _room(samples: int) -> tuple[NDArray[Any], ...]:
+    """What one thread needs to draw a tile: not written before it is used, but for the last, the pixels' middles."""
+    from pointmass.render import kernels_shade as k
+
+    cells = np.empty((samples, k.BLOCK // k.LINE, k.LINE), dtype=np.float32)
+    even = np.empty(k.AREA, dtype=np.bool_)
+    waiting = np.empty(k.LINES * k.STEP, dtype=np.float32)
+    spots = np.empty((2, k.WAITING), dtype=np.int64)
+    steps = np.empty(samples, dtype=np.float32)
+    ramp = (np.arange(k.TILE) + 0.5).astype(np.float32)
+    return cells.ravel(), cells, even, waiting, spots, steps, ramp
 
 
 class _Tables:

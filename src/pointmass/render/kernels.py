@@ -33,11 +33,9 @@ from pointmass.render.kernels_shade import (
     DEPTH,
     GREEN,
     HALF,
-    LINE,
-    LINES,
+    NONE,
     ONE,
     RED,
-    STEP,
     TILE,
     TINY,
     WAITING,
@@ -173,7 +171,7 @@ def _face(t, box, area, solid, tile, count, camera, offsets, steps):
         x0, x1, within0, within1 = _face_spans(corner, y, left, right)
         start = _place(row, area)
         for column in range(x0, x1):
-            mask = 0
+            mask = NONE
             p = start + column
             near = np.float32(z0 + zx * column + zy * row)
             within = within0 <= column < within1
@@ -264,8 +262,8 @@ def _ball_solid(c, box, area, tile, count, camera, offsets):
     for row in range(first, last):
         start = _place(row, area)
         for column in range(left, right):
-            hits, sx, sy = 0, ZERO, ZERO
-            mask = 0
+            hits, sx, sy = NONE, ZERO, ZERO
+            mask = NONE
             p = start + column
             for k in range(samples):
                 dx, dy = _ray(np.float32(column) + offsets[k, 0], np.float32(row) + offsets[k, 1], camera)
@@ -302,7 +300,7 @@ def _ball_soft(c, box, area, tile, count, camera):
             _, px, py, pz, _ = _closest(c, dx, dy)
             alpha = strength * clamp(shown + HALF - scale * math.sqrt(px * px + py * py + pz * pz), ZERO, ONE)
             if alpha > ZERO:
-                count = _put_ball(c, dx, dy, alpha, w, sharp, tile, count, start + column, 0)
+                count = _put_ball(c, dx, dy, alpha, w, sharp, tile, count, start + column, NONE)
     return count
 
 
@@ -396,8 +394,8 @@ def _capsule_solid(c, box, area, tile, count, camera, offsets):
         x0, x1 = _capsule_span(c, np.float32(row) + HALF, max(ra, rb) + ONE, left, right)
         start = _place(row, area)
         for column in range(x0, x1):
-            hits, sx, sy = 0, ZERO, ZERO
-            mask = 0
+            hits, sx, sy = NONE, ZERO, ZERO
+            mask = NONE
             p = start + column
             for k in range(samples):
                 px, py = np.float32(column) + offsets[k, 0], np.float32(row) + offsets[k, 1]
@@ -461,7 +459,7 @@ def _capsule_soft(c, box, area, tile, count, camera):
                 w = wa + t * (wb - wa)
                 z = ONE / w
                 sharp = z * camera[0] / shown
-                count = _put_line(c, t, radius, z, px, py, alpha, w, sharp, camera, tile, count, start + column, 0)
+                count = _put_line(c, t, radius, z, px, py, alpha, w, sharp, camera, tile, count, start + column, NONE)
     return count
 
 
@@ -509,11 +507,14 @@ def _fill(cells, even, area, samples, colors):
     for row in range(area[2], area[3]):
         start = (row - area[2]) * TILE
         for channel in range(3):
-            cells[0, channel, start : start + TILE] = colors[row, channel]
+            for p in range(start, start + TILE):
+                cells[0, channel, p] = colors[row, channel]
     for k in range(samples):
         for line in range(DEPTH, DEPTH + 3):
-            cells[k, line, :AREA] = ZERO
-    even[:] = True
+            for p in range(AREA):
+                cells[k, line, p] = ZERO
+    for p in range(AREA):
+        even[p] = True
 
 
 @inner
@@ -521,8 +522,8 @@ def _part(cells, even, samples):
     """Every sample becomes a layer of its own."""
     for p in range(AREA):
         spread(cells, even, p, samples)
-    for k in range(samples):
-        cells[k, DEPTH + 1, :AREA] = cells[k, DEPTH, :AREA]
+        for k in range(samples):
+            cells[k, DEPTH + 1, p] = cells[k, DEPTH, p]
 
 
 @inner
@@ -561,7 +562,9 @@ def _hand_over(cells, area, picture, bright):
     for channel in range(3):
         for row in range(top, bottom):
             start = (row - top) * TILE
-            picture[channel, row, left:right] = cells[0, channel, start : start + right - left]
+            source, target = cells[0, channel, start:], picture[channel, row, left:right]
+            for i in range(right - left):
+                target[i] = source[i]
     spilled = False
     for row in range(top // 2, (bottom + 1) // 2):
         for column in range(left // 2, (right + 1) // 2):
@@ -608,7 +611,10 @@ def sort_into_tiles(box, columns, rows):
 
 @inner
 def _any_below(items, bound):
-    return len(items) > 0 and items.min() < bound
+    found = False
+    for item in items:
+        found |= item < bound
+    return found
 
 
 @inner
@@ -618,7 +624,7 @@ def _draw_all(items, solid, tables, area, tile, space):
     camera, offsets, steps, ramp = space
     room, layers = tile[0], tile[5]
     capsule_first = len(faces) + len(balls)
-    count = 0
+    count = NONE
     for item in items:
         if item < len(faces):
             count = _face(faces[item], face_box[item], area, solid, tile, count, camera, offsets, steps)
@@ -649,6 +655,7 @@ def _draw_all(items, solid, tables, area, tile, space):
 def draw(
     band, picture, bright, background, camera, offsets, solid_starts, solids, soft_starts, softs,
     faces, face_box, balls, ball_box, capsules, capsule_box, lamp, shadow, matrix,
+    room, cells, even, waiting, spots, steps, ramp,
 ):  # fmt: skip
     """Draw one band of tiles, in linear light; whether anything in it spills.
 
@@ -665,23 +672,15 @@ def draw(
     faces, face_box, balls, ball_box, capsules, capsule_box : rows of the tables.
     lamp : directions and colours of the light, see `lamp.py`.
     shadow, matrix : the shadow map.
+    room, cells, even, waiting, spots, steps, ramp : room to work in, see `image.py`.
     """
     height, width = picture.shape[1], picture.shape[2]
     picture, bright, background = bare(picture), bare(bright), bare(background)
     camera, offsets, lamp, shadow, matrix = bare(camera), bare(offsets), bare(lamp), bare(shadow), bare(matrix)
     tables = (bare(faces), bare(face_box), bare(balls), bare(ball_box), bare(capsules), bare(capsule_box))
+    room, cells, even, waiting, spots = bare(room), bare(cells), bare(even), bare(waiting), bare(spots)
+    space = (camera, offsets, bare(steps), bare(ramp))
     most = len(offsets)
-    owners = (
-        np.empty(most * BLOCK, dtype=np.float32),
-        np.empty(AREA, dtype=np.bool_),
-        np.empty(LINES * STEP, dtype=np.float32),
-        np.empty((2, WAITING), dtype=np.int64),
-        np.empty(most, dtype=np.float32),
-        (np.arange(TILE) + 0.5).astype(np.float32),
-    )
-    room, even, waiting, spots = bare(owners[0]), bare(owners[1]), bare(owners[2]), bare(owners[3])
-    cells = room.reshape((most, BLOCK // LINE, LINE))
-    space = (camera, offsets, bare(owners[4]), bare(owners[5]))
     columns = (width + TILE - 1) // TILE
     spilled = False
     for column in range(columns):

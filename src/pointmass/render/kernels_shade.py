@@ -31,6 +31,7 @@ LINES = 17
 # alpha, the 1/z by which it is hidden, how sharply; then room for the place in the shadow map and the share of light.
 X, Y, Z, NX, NY, NZ, R, G, B, GLOSS, ALPHA, W, SHARP, U, V, DEEP, LIT = (STEP * line for line in range(LINES))
 
+NONE = np.int64(0)  # a plain 0 is a type of its own: each function would be compiled once more for it
 # Wrapped, or every product with them would be in double precision.
 ZERO = np.float32(0.0)
 HALF = np.float32(0.5)
@@ -98,7 +99,7 @@ def flush(tile, count):
             cells[k, 0, p] += share * (r - cells[k, 0, p])
             cells[k, 1, p] += share * (g - cells[k, 1, p])
             cells[k, 2, p] += share * (b - cells[k, 2, p])
-    return 0
+    return NONE
 
 
 @inner
