@@ -134,3 +134,11 @@ def test_forces_that_are_not_finite():
     system = pm.ParticleSystem(pm.Particles(np.zeros((2, 3))), [pm.Gravitation()])
     with pytest.raises(pm.InvalidInput, match="not finite"):
         system.stability(pm.Leapfrog())
+
+
+@pytest.mark.parametrize(("solver", "limit"), [("symplectic_euler", 2.0), ("euler", 2.0), ("rk4", 2.785294)])
+def test_drag_on_unequal_masses_is_limited_by_the_lightest(solver: str, limit: float) -> None:
+    """Each particle is on its own: h < limit m/k of the lightest, for any others beside it."""
+    p = pm.Particles([[0, 0, 0], [1, 0, 0], [5, 5, 5]], m=[0.5, 1.0, 2.5])
+    report = pm.ParticleSystem(p, [pm.Drag(0.5), pm.Gravity()]).stability(solver)
+    assert report.largest_safe_dt == pytest.approx(limit, rel=1e-6)

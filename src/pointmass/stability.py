@@ -49,11 +49,12 @@ def stability(system: ParticleSystem, solver: Solver) -> Stability:
     InvalidInput
         A force has no Jacobian (a NumPy function that couples particles).
     """
-    values = eigenvalues(system)
+    parts = spectra(system)
+    values = np.concatenate(parts)
     fast = values[np.argmax(np.abs(values))] if len(values) else 0.0
     size = float(np.abs(fast))
     return Stability(
-        largest_safe_dt=float(largest_safe_step(solver, values)),
+        largest_safe_dt=float(largest_safe_step(solver, *parts)),
         frequency=size,
         damping_ratio=float(-np.real(fast) / size) if size > 0 else 0.0,
         period=2 * math.pi / size if size > 0 else math.inf,
@@ -61,7 +62,12 @@ def stability(system: ParticleSystem, solver: Solver) -> Stability:
 
 
 def eigenvalues(system: ParticleSystem) -> NDArray[np.complex128]:
-    """Eigenvalues of d(deriv_eval)/dy now [1/s], island by island.
+    """Eigenvalues of d(deriv_eval)/dy now [1/s], of all islands (see `spectra`)."""
+    return np.concatenate(spectra(system))
+
+
+def spectra(system: ParticleSystem) -> list[NDArray[np.complex128]]:
+    """Eigenvalues of d(deriv_eval)/dy now [1/s], one array for each island that is different from the others.
 
     All of them; where that is too much work, those of largest size, of largest frequency and of strongest damping.
 
@@ -71,7 +77,7 @@ def eigenvalues(system: ParticleSystem) -> NDArray[np.complex128]:
         The forces are not finite, or have no Jacobian, or the iteration does not converge.
     """
     if not len(system.particles):
-        return np.zeros(0, complex)
+        return [np.zeros(0, complex)]
     matrix = system.jacobian(system.t, system.get_state())
     if not np.isfinite(matrix.data).all():
         raise InvalidInput("the forces are not finite where the particles are now: there is no largest step")
@@ -79,10 +85,10 @@ def eigenvalues(system: ParticleSystem) -> NDArray[np.complex128]:
     sizes = np.bincount(islands).astype(float)
     if sizes.max() <= DENSE and (sizes**3).sum() <= WORK * DENSE**3:
         return _dense(matrix, islands)
-    return _extreme(matrix.astype(np.float64), system.inertia if system.order == 2 else None)
+    return [_extreme(matrix.astype(np.float64), system.inertia if system.order == 2 else None)]
 
 
-def _dense(matrix: Any, islands: NDArray[np.intp]) -> NDArray[np.complex128]:
+def _dense(matrix: Any, islands: NDArray[np.intp]) -> list[NDArray[np.complex128]]:
     """All eigenvalues: one block for each island, islands of equal size at once."""
     entries = matrix.tocoo()
     row, column = entries.coords
@@ -90,14 +96,22 @@ def _dense(matrix: Any, islands: NDArray[np.intp]) -> NDArray[np.complex128]:
     order = np.argsort(islands, kind="stable")
     place = np.empty(len(islands), np.intp)  # of each entry within its island
     place[order] = np.arange(len(islands)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-    found = []
+    found: list[NDArray[np.complex128]] = []
     for size in np.unique(sizes):
         number = np.cumsum(sizes == size) - 1
         mine = sizes[islands[row]] == size
         blocks = np.zeros((int((sizes == size).sum()), size, size))
         blocks[number[islands[row[mine]]], place[row[mine]], place[column[mine]]] = entries.data[mine]
-        found.append(np.linalg.eigvals(np.unique(blocks, axis=0)).ravel())
-    return np.concatenate(found).astype(np.complex128)
+        for block in np.unique(blocks, axis=0):
+            values = np.linalg.eigvals(block).astype(np.complex128)
+            found.append(values if block[size // 2 :, : size // 2].any() else _strongest_drag(values))
+    return found
+
+
+def _strongest_drag(values: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Of a part without stiffness, where each real eigenvalue is a drag by itself: the others are slower."""
+    real = values.imag == 0
+    return np.concatenate([values[~real], values[real][np.argsort(values[real].real)[:1]]])
 
 
 def _extreme(matrix: Any, inertia: NDArray[np.floating[Any]] | None) -> NDArray[np.complex128]:

@@ -14,6 +14,7 @@ from pointmass.solvers.base import Array, Memory, Solver
 from pointmass.solvers.control import control_of
 from pointmass.solvers.function_system import FunctionSystem
 
+MOST_MODES = 300
 SHORTEST, LONGEST, TRIALS = 2e-3, 1e4, 200  # steps to try, times the size of the eigenvalue
 STRICT, TOLERANCE = 1e-12, 1e-9  # growth per step that is round-off, for short steps and for others
 SHORT = 0.02
@@ -41,13 +42,14 @@ def amplification(solver: Solver | type[Solver], omega: ArrayLike, zeta: ArrayLi
     return radius.reshape(h.shape)[()]
 
 
-def largest_safe_step(solver: Solver, eigenvalues: ArrayLike) -> float:
+def largest_safe_step(solver: Solver, *eigenvalues: ArrayLike) -> float:
     """The largest h such that no step in (0, h] amplifies a mode that does not grow by itself.
 
     Parameters
     ----------
     solver : with its arguments.
-    eigenvalues : of the Jacobian of dy/dt [1/s], complex, shape (k,). Zeros and growing modes are left out.
+    eigenvalues : of the Jacobian of dy/dt [1/s], complex, shape (k,), for each independent part of a system. Zeros and
+        growing modes are left out.
 
     Returns
     -------
@@ -58,15 +60,24 @@ def largest_safe_step(solver: Solver, eigenvalues: ArrayLike) -> float:
     Notes
     -----
     For methods that treat x and v differently the limit of an overdamped mode depends on both of its eigenvalues.
-    Which real ones belong together is not known, so the two largest are taken for a pair: a bound that is never too
-    large. A single real eigenvalue is a drag without a spring.
+    Which real ones of a part belong together is not known, so its two largest are taken for a pair: a bound that is
+    never too large. A single real eigenvalue is a drag without a spring.
     """
     if control_of(solver) is not None:
         return float("inf")
-    modes = _modes(np.asarray(eigenvalues, np.complex128).ravel())
+    modes = {mode for part in eigenvalues for mode in _modes(np.asarray(part, np.complex128).ravel())}
     if not modes:
         return float("inf")
-    return float(_limits(solver, *np.array(modes).T).min())
+    return float(_limits(solver, *_fastest(np.array(sorted(modes))).T).min())
+
+
+def _fastest(modes: Array) -> Array:
+    """Without weaker drags than the strongest, and no more modes than can be tried, shape (k, 2)."""
+    drag = modes[:, 0] == 0
+    modes = np.concatenate([modes[~drag], modes[drag][-1:]])
+    speed = np.sqrt(modes[:, 0]) + modes[:, 1]
+    kept: Array = modes[np.argsort(-speed, kind="stable")[:MOST_MODES]]
+    return kept
 
 
 def _modes(eigenvalues: NDArray[np.complex128]) -> list[tuple[float, float]]:
