@@ -167,7 +167,11 @@ def test_nobody_ends_inside(kind, seed, name, dt, speed, tilt, radius, linked):
     start = np.stack([np.minimum(c.distance(p.x, 0) - p.radius, 0) for c in chosen])
     pinned = p.x[0].copy()
     for _ in range(15):
-        sim.step()
+        try:
+            sim.step()
+        except pm.Diverged:
+            assert sim.solver.implicit, "Newton's method may give up on a wild scene, and says so"
+            break
         for c, before in zip(chosen, start, strict=True):
             depth = c.distance(p.x, sim.t) - p.radius
             assert (depth - before >= -1e-9 * (1 + np.abs(p.x).max(axis=1))).all()
