@@ -317,3 +317,22 @@ def test_style_out_of_range(numbers):
 def test_camera_on_its_target():
     with pytest.raises(InvalidInput, match="camera"):
         look(Camera(position=(1, 1, 1), target=(1, 1, 1)), (4, 4))
+
+
+@pytest.mark.parametrize("kind", ["ball", "line"])
+@pytest.mark.parametrize("x", [-7.1, -6.9, -6.8, 0.1, 0.25, 6.7, 6.9])
+def test_a_glow_lights_nothing_beyond_its_reach(kind, x):
+    # Kernels work on tiles of 128 pixels and whole blocks of them: what lies across an edge must not come back.
+    ends = np.array([[x, -0.4, 0.0], [x + 0.2, 0.4, 0.0]])
+    glow = (
+        Points(name="g", index=np.array([0]), radius=0.1, color=(3.0, 3.0, 3.0, 1.0), glow=True)
+        if kind == "ball"
+        else Segments(name="g", pairs=np.array([[0, 1]]), width=0.1, color=(3.0, 3.0, 3.0, 1.0), glow=True)
+    )
+    size = (512, 100)
+    picture = brightness(image(frame(ends, glow), camera=FRONT, size=size, style=BLACK))
+    scale = 50.0 / math.tan(math.radians(15.0)) / 10.0
+    rows, columns = np.nonzero(picture > 3)
+    assert len(rows) > 20
+    assert columns.min() >= 256 + scale * (x - 0.35) - 1
+    assert columns.max() <= 256 + scale * (x + 0.2 + 0.35) + 1

@@ -6,6 +6,7 @@ import math
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Protocol
@@ -241,21 +242,31 @@ def _draw(
     style: Style | None,
     progress: Callable[[int], None] | None,
 ) -> None:
-    """Every frame to the writer; on any exception, an interrupt too, the writer gives up."""
+    """Every frame to the writer, which encodes one picture while the next is drawn.
+
+    On any exception, an interrupt too, the writer gives up.
+    """
     count = 0
-    try:
-        for frame in frames:
-            if count == 0:
-                camera = fit_camera([frame], camera, size)
-            writer.add(image(frame, camera=camera, size=size, style=style), frame.number)
-            count += 1
-            if progress is not None:
-                progress(count)
-        if count == 0:
-            raise InvalidInput("there are no frames to write")
-    except BaseException:
-        writer.abort()
-        raise
+    encoded: Future[None] | None = None
+    with ThreadPoolExecutor(1) as encoder:
+        try:
+            for frame in frames:
+                if count == 0:
+                    camera = fit_camera([frame], camera, size)
+                picture = image(frame, camera=camera, size=size, style=style)
+                if encoded is not None:
+                    encoded.result()
+                encoded = encoder.submit(writer.add, picture, frame.number)
+                count += 1
+                if progress is not None:
+                    progress(count)
+            if encoded is None:
+                raise InvalidInput("there are no frames to write")
+            encoded.result()
+        except BaseException:
+            encoder.shutdown()  # a picture that is being encoded needs the file
+            writer.abort()
+            raise
     writer.close()
 
 

@@ -115,13 +115,13 @@ def _room(samples: int) -> tuple[NDArray[Any], ...]:
     """What one thread needs to draw a tile: not written before it is used, but for the last, the pixels' middles."""
     from pointmass.render import kernels_shade as k
 
-    cells = np.empty((samples, k.BLOCK // k.LINE, k.LINE), dtype=np.float32)
+    room = np.empty(samples * k.BLOCK, dtype=np.float32)
     even = np.empty(k.AREA, dtype=np.bool_)
     waiting = np.empty(k.LINES * k.STEP, dtype=np.float32)
     spots = np.empty((2, k.WAITING), dtype=np.int64)
     steps = np.empty(samples, dtype=np.float32)
     ramp = (np.arange(k.TILE) + 0.5).astype(np.float32)
-    return cells.ravel(), cells, even, waiting, spots, steps, ramp
+    return room, even, waiting, spots, steps, ramp
 
 
 class _Tables:

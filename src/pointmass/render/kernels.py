@@ -30,9 +30,12 @@ from pointmass.render.kernels_shade import (
     BAND,
     BLOCK,
     BLUE,
-    DEPTH,
+    COVER,
+    FAR,
     GREEN,
     HALF,
+    LINE,
+    NEAR,
     NONE,
     ONE,
     RED,
@@ -160,7 +163,7 @@ def _face(t, box, area, solid, tile, count, camera, offsets, steps):
     zx, zy = vx * nearer_b + wx * nearer_c, vy * nearer_b + wy * nearer_c
     # Corners turn counter-clockwise seen from outside, and pixels count downwards.
     side = ONE if twice < 0.0 else -ONE
-    cells, waiting, spots, samples = tile[1], tile[3], tile[4], tile[6]
+    room, waiting, spots, samples = tile[0], tile[2], tile[3], tile[5]
     z0 = t[6] - zx * ax - zy * ay
     corner, begun = (ax, ay, vx, vy, wx, wy), count
     for k in range(samples):
@@ -176,17 +179,14 @@ def _face(t, box, area, solid, tile, count, camera, offsets, steps):
             near = np.float32(z0 + zx * column + zy * row)
             within = within0 <= column < within1
             for k in range(samples):
-                if not near + steps[k] > cells[k, DEPTH, p]:
+                if not near + steps[k] > room[k * BLOCK + NEAR + p]:
                     continue
                 if within or _covers(corner, column + offsets[k, 0], row + offsets[k, 1]):
                     mask |= 1 << k
                     if solid:
-                        cells[k, DEPTH, p] = near + steps[k]
+                        room[k * BLOCK + NEAR + p] = near + steps[k]
             if mask == 0:
                 continue
-            if count == WAITING:
-                _put_faces(t, begun, count, waiting, corner, side, solid, camera)
-                begun = count = flush(tile, count)
             px, py = _middle(mask, offsets, samples)
             spots[0, count], spots[1, count] = p, mask
             waiting[U + count], waiting[V + count] = px + column, py + row
@@ -237,8 +237,6 @@ def _closest(c, dx, dy):
 @inner
 def _put_ball(c, dx, dy, alpha, w, sharp, tile, count, p, mask):
     """What a ball shows along a ray; a ray that just misses sees the edge."""
-    if count == WAITING:
-        count = flush(tile, count)
     along, px, py, pz, square = _closest(c, dx, dy)
     half = math.sqrt(max(c[3] * c[3] - px * px - py * py - pz * pz, ZERO) / square)
     nx, ny, nz = unit(-px - half * dx, -py - half * dy, -pz - half)
@@ -246,7 +244,7 @@ def _put_ball(c, dx, dy, alpha, w, sharp, tile, count, p, mask):
     # A ball is darker at its edge, as if it stood among others.
     turned = ONE + (nx * dx + ny * dy + nz) / math.sqrt(square)
     dark = ONE - FALLOFF * turned * turned
-    waiting, spots = tile[3], tile[4]
+    waiting, spots = tile[2], tile[3]
     spots[0, count], spots[1, count] = p, mask
     put(
         waiting, count, dx * z, dy * z, z, nx, ny, nz,
@@ -257,7 +255,7 @@ def _put_ball(c, dx, dy, alpha, w, sharp, tile, count, p, mask):
 
 @inner
 def _ball_solid(c, box, area, tile, count, camera, offsets):
-    cells, samples = tile[1], tile[6]
+    room, samples = tile[0], tile[5]
     left, right, first, last = _cut(box, area)
     for row in range(first, last):
         start = _place(row, area)
@@ -271,8 +269,8 @@ def _ball_solid(c, box, area, tile, count, camera, offsets):
                 rest = c[3] * c[3] - px * px - py * py - pz * pz
                 if rest > ZERO:
                     near = ONE / (along - math.sqrt(rest / square))
-                    if near > cells[k, DEPTH, p]:
-                        cells[k, DEPTH, p] = near
+                    if near > room[k * BLOCK + NEAR + p]:
+                        room[k * BLOCK + NEAR + p] = near
                         mask |= 1 << k
                         hits += 1
                         sx += dx
@@ -325,8 +323,8 @@ def _ball_glow(c, box, area, room, ramp, camera):
     for row in range(first, last):
         ey = np.float32(row) + HALF - y
         half = math.sqrt(max(reach * reach - ey * ey, ZERO)) + ONE
-        x0 = max(left, np.int64(math.floor(x - half)))
-        x0, x1 = _glow_span(area[0], x0, max(x0, min(right, np.int64(math.ceil(x + half)))))
+        x0 = clamp(np.int64(math.floor(x - half)), left, right)
+        x0, x1 = _glow_span(area[0], x0, clamp(np.int64(math.ceil(x + half)), x0, right))
         line = room[_place(row, area) + x0 :]
         before = np.float32(x0) - x
         for i in range(x1 - x0):
@@ -338,6 +336,18 @@ def _ball_glow(c, box, area, room, ramp, camera):
             line[RED + i] += f * r
             line[GREEN + i] += f * g
             line[BLUE + i] += f * b
+
+
+@inner
+def _ball(c, box, area, solid, glows, tile, count, space):
+    camera, offsets, _, ramp = space
+    if solid:
+        return _ball_solid(c, box, area, tile, count, camera, offsets)
+    if not glows:
+        return _ball_soft(c, box, area, tile, count, camera)
+    for k in range(tile[4]):
+        _ball_glow(c, box, area, tile[0][k * BLOCK :], ramp, camera)
+    return count
 
 
 @inner
@@ -360,8 +370,6 @@ def _across(c, dx, dy, inverse, px, py):
 @inner
 def _put_line(c, t, radius, z, px, py, alpha, w, sharp, camera, tile, count, p, mask):
     """What a round line shows: the normal turns from edge to edge; along the line all is linear in the picture."""
-    if count == WAITING:
-        count = flush(tile, count)
     tx, ty, tz = unit(c[3] - c[0], c[4] - c[1], c[5] - c[2])
     dx, dy = _ray(px, py, camera)
     vx, vy, vz = unit(-dx, -dy, -ONE)
@@ -373,7 +381,7 @@ def _put_line(c, t, radius, z, px, py, alpha, w, sharp, camera, tile, count, p, 
     front = math.sqrt(ONE - s * s)
     dark = ONE - FALLOFF * (ONE - front) * (ONE - front)
     r, g, b = c[12] + t * (c[16] - c[12]), c[13] + t * (c[17] - c[13]), c[14] + t * (c[18] - c[14])
-    waiting, spots = tile[3], tile[4]
+    waiting, spots = tile[2], tile[3]
     spots[0, count], spots[1, count] = p, mask
     put(
         waiting, count, dx * z, dy * z, z, s * lx + front * fx, s * ly + front * fy, front * fz,
@@ -384,7 +392,7 @@ def _put_line(c, t, radius, z, px, py, alpha, w, sharp, camera, tile, count, p, 
 
 @inner
 def _capsule_solid(c, box, area, tile, count, camera, offsets):
-    cells, samples = tile[1], tile[6]
+    room, samples = tile[0], tile[5]
     wa, wb = ONE / c[2], ONE / c[5]
     ra, rb = camera[0] * c[6] * wa, camera[0] * c[7] * wb
     dx, dy = c[10] - c[8], c[11] - c[9]
@@ -406,8 +414,8 @@ def _capsule_solid(c, box, area, tile, count, camera, offsets):
                     # The surface bulges towards the eye by a part of the radius.
                     bulge = math.sqrt(ONE - off / square) * min(radius * camera[3], HALF)
                     near = (wa + t * (wb - wa)) / (ONE - bulge)
-                    if near > cells[k, DEPTH, p]:
-                        cells[k, DEPTH, p] = near
+                    if near > room[k * BLOCK + NEAR + p]:
+                        room[k * BLOCK + NEAR + p] = near
                         mask |= 1 << k
                         hits += 1
                         sx += px
@@ -502,32 +510,44 @@ def _capsule_glow(c, box, area, room, ramp, camera):
 
 
 @inner
-def _fill(cells, even, area, samples, colors):
+def _capsule(c, box, area, solid, glows, tile, count, space):
+    camera, offsets, _, ramp = space
+    if solid:
+        return _capsule_solid(c, box, area, tile, count, camera, offsets)
+    if not glows:
+        return _capsule_soft(c, box, area, tile, count, camera)
+    for k in range(tile[4]):
+        _capsule_glow(c, box, area, tile[0][k * BLOCK :], ramp, camera)
+    return count
+
+
+@inner
+def _fill(room, even, area, samples, colors):
     """A tile with nothing in it."""
     for row in range(area[2], area[3]):
         start = (row - area[2]) * TILE
         for channel in range(3):
             for p in range(start, start + TILE):
-                cells[0, channel, p] = colors[row, channel]
+                room[channel * LINE + p] = colors[row, channel]
     for k in range(samples):
-        for line in range(DEPTH, DEPTH + 3):
+        for line in (NEAR, FAR, COVER):
             for p in range(AREA):
-                cells[k, line, p] = ZERO
+                room[k * BLOCK + line + p] = ZERO
     for p in range(AREA):
         even[p] = True
 
 
 @inner
-def _part(cells, even, samples):
+def _part(room, even, samples):
     """Every sample becomes a layer of its own."""
     for p in range(AREA):
-        spread(cells, even, p, samples)
+        spread(room, even, p, samples)
         for k in range(samples):
-            cells[k, DEPTH + 1, p] = cells[k, DEPTH, p]
+            room[k * BLOCK + FAR + p] = room[k * BLOCK + NEAR + p]
 
 
 @inner
-def _mix(cells, even, samples):
+def _mix(room, even, samples):
     """The mean of each pixel's samples into the first layer."""
     share = ONE / np.float32(samples)
     for p in range(AREA):
@@ -535,34 +555,34 @@ def _mix(cells, even, samples):
             for channel in range(3):
                 total = ZERO
                 for k in range(samples):
-                    total += cells[k, channel, p]
-                cells[0, channel, p] = share * total
+                    total += room[k * BLOCK + channel * LINE + p]
+                room[channel * LINE + p] = share * total
 
 
 @inner
-def _resolve(cells, samples):
+def _resolve(room, samples):
     """The depths of each pixel into the first layer: the nearest, the farthest, and the share of the nearest.
 
     As if there were two surfaces: then the mean tells how much of the pixel the nearer one covers.
     """
     share = ONE / np.float32(samples)
     for p in range(AREA):
-        near = far = total = cells[0, DEPTH, p]
+        near = far = total = room[NEAR + p]
         for k in range(1, samples):
-            deep = cells[k, DEPTH, p]
+            deep = room[k * BLOCK + NEAR + p]
             near, far, total = max(near, deep), min(far, deep), total + deep
-        cells[0, DEPTH, p], cells[0, DEPTH + 1, p] = near, far
-        cells[0, DEPTH + 2, p] = clamp((total * share - far) / (near - far), ZERO, ONE) if near > far else ZERO
+        room[NEAR + p], room[FAR + p] = near, far
+        room[COVER + p] = clamp((total * share - far) / (near - far), ZERO, ONE) if near > far else ZERO
 
 
 @inner
-def _hand_over(cells, area, picture, bright):
+def _hand_over(room, area, picture, bright):
     """A tile into the picture, and what is brighter than the knee, at half the size; whether there is any."""
     left, right, top, bottom = area
     for channel in range(3):
         for row in range(top, bottom):
             start = (row - top) * TILE
-            source, target = cells[0, channel, start:], picture[channel, row, left:right]
+            source, target = room[channel * LINE + start :], picture[channel, row, left:right]
             for i in range(right - left):
                 target[i] = source[i]
     spilled = False
@@ -572,12 +592,12 @@ def _hand_over(cells, area, picture, bright):
             for j in range(2):
                 for i in range(2):
                     p = (min(2 * row + j, bottom - 1) - top) * TILE + min(2 * column + i, right - 1) - left
-                    most = max(cells[0, 0, p], cells[0, 1, p], cells[0, 2, p])
+                    most = max(room[RED + p], room[GREEN + p], room[BLUE + p])
                     if most > KNEE:
                         share = np.float32(0.25) * (min(most, HOTTEST) - KNEE) / most
-                        r += share * cells[0, 0, p]
-                        g += share * cells[0, 1, p]
-                        b += share * cells[0, 2, p]
+                        r += share * room[RED + p]
+                        g += share * room[GREEN + p]
+                        b += share * room[BLUE + p]
                         spilled = True
             bright[0, row, column], bright[1, row, column], bright[2, row, column] = r, g, b
     return spilled
@@ -621,33 +641,24 @@ def _any_below(items, bound):
 def _draw_all(items, solid, tables, area, tile, space):
     """The things of a tile, in their order."""
     faces, face_box, balls, ball_box, capsules, capsule_box = tables
-    camera, offsets, steps, ramp = space
-    room, layers = tile[0], tile[5]
+    camera, offsets, steps, _ = space
     capsule_first = len(faces) + len(balls)
     count = NONE
     for item in items:
-        if item < len(faces):
-            count = _face(faces[item], face_box[item], area, solid, tile, count, camera, offsets, steps)
-        elif item < capsule_first:
-            ball, box = balls[item - len(faces)], ball_box[item - len(faces)]
-            if solid:
-                count = _ball_solid(ball, box, area, tile, count, camera, offsets)
-            elif ball[8] > ZERO:
-                count = flush(tile, count)  # what lies behind the glow
-                for k in range(layers):
-                    _ball_glow(ball, box, area, room[k * BLOCK :], ramp, camera)
-            else:
-                count = _ball_soft(ball, box, area, tile, count, camera)
+        kind = 0 if item < len(faces) else (1 if item < capsule_first else 2)
+        i = item - (0 if kind == 0 else (len(faces) if kind == 1 else capsule_first))
+        box = face_box[i] if kind == 0 else (ball_box[i] if kind == 1 else capsule_box[i])
+        left, right, first, last = _cut(box, area)
+        glows = not solid and (balls[i, 8] > ZERO if kind == 1 else (capsules[i, 24] > ZERO if kind == 2 else False))
+        # Room for all it may show; and what lies behind a glow must be there before it.
+        if glows or count + (right - left) * (last - first) > WAITING:
+            count = flush(tile, count)
+        if kind == 0:
+            count = _face(faces[i], box, area, solid, tile, count, camera, offsets, steps)
+        elif kind == 1:
+            count = _ball(balls[i], box, area, solid, glows, tile, count, space)
         else:
-            line, box = capsules[item - capsule_first], capsule_box[item - capsule_first]
-            if solid:
-                count = _capsule_solid(line, box, area, tile, count, camera, offsets)
-            elif line[24] > ZERO:
-                count = flush(tile, count)
-                for k in range(layers):
-                    _capsule_glow(line, box, area, room[k * BLOCK :], ramp, camera)
-            else:
-                count = _capsule_soft(line, box, area, tile, count, camera)
+            count = _capsule(capsules[i], box, area, solid, glows, tile, count, space)
     flush(tile, count)
 
 
@@ -655,7 +666,7 @@ def _draw_all(items, solid, tables, area, tile, space):
 def draw(
     band, picture, bright, background, camera, offsets, solid_starts, solids, soft_starts, softs,
     faces, face_box, balls, ball_box, capsules, capsule_box, lamp, shadow, matrix,
-    room, cells, even, waiting, spots, steps, ramp,
+    room, even, waiting, spots, steps, ramp,
 ):  # fmt: skip
     """Draw one band of tiles, in linear light; whether anything in it spills.
 
@@ -672,13 +683,13 @@ def draw(
     faces, face_box, balls, ball_box, capsules, capsule_box : rows of the tables.
     lamp : directions and colours of the light, see `lamp.py`.
     shadow, matrix : the shadow map.
-    room, cells, even, waiting, spots, steps, ramp : room to work in, see `image.py`.
+    room, even, waiting, spots, steps, ramp : room to work in, see `image.py`.
     """
     height, width = picture.shape[1], picture.shape[2]
     picture, bright, background = bare(picture), bare(bright), bare(background)
     camera, offsets, lamp, shadow, matrix = bare(camera), bare(offsets), bare(lamp), bare(shadow), bare(matrix)
     tables = (bare(faces), bare(face_box), bare(balls), bare(ball_box), bare(capsules), bare(capsule_box))
-    room, cells, even, waiting, spots = bare(room), bare(cells), bare(even), bare(waiting), bare(spots)
+    room, even, waiting, spots = bare(room), bare(even), bare(waiting), bare(spots)
     space = (camera, offsets, bare(steps), bare(ramp))
     most = len(offsets)
     columns = (width + TILE - 1) // TILE
@@ -690,17 +701,17 @@ def draw(
         layered = most > 1 and _any_below(back, len(faces))  # clear faces need the samples apart until the end
         samples = most if layered or len(front) > 0 else 1
         layers = samples if layered else 1
-        _fill(cells, even, area, samples, background)
+        _fill(room, even, area, samples, background)
         # First what hides, then what is laid over: one walk is compiled for both.
         for solid in (True, False):
             if not solid and layered:
-                _part(cells, even, samples)
+                _part(room, even, samples)
             elif not solid and samples > 1:
-                _mix(cells, even, samples)
-                _resolve(cells, samples)
-            tile = (room, cells, even, waiting, spots, layers, samples, lamp, shadow, matrix)
+                _mix(room, even, samples)
+                _resolve(room, samples)
+            tile = (room, even, waiting, spots, layers, samples, lamp, shadow, matrix)
             _draw_all(front if solid else back, solid, tables, area, tile, space)
         if layered:
-            _mix(cells, even, samples)
-        spilled |= _hand_over(cells, area, picture, bright)
+            _mix(room, even, samples)
+        spilled |= _hand_over(room, area, picture, bright)
     return spilled

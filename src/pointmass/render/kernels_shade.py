@@ -22,9 +22,8 @@ LINE = AREA + 48  # a tile's lines in memory: at powers of two they would push e
 # farthest; and for the share of the nearest.
 RED, GREEN, BLUE, NEAR, FAR, COVER = (LINE * line for line in range(6))
 BLOCK = 6 * LINE  # from layer to layer
-DEPTH = 3  # the line of 1/z
 
-WAITING = 512  # fragments that the table holds: few enough to stay in the processor's nearest memory
+WAITING = AREA  # fragments that the table holds: what one thing may show in a tile
 STEP = WAITING + 16  # from line to line: at powers of two they would push each other out of the cache
 LINES = 17
 # Where the line of each number starts: the place, the normal (of any length), the colour, how much it shines, its
@@ -76,7 +75,7 @@ def shown(line, i, w, sharp):
 @inner
 def flush(tile, count):
     """Light the fragments that wait, and lay them into the tile; 0, which is how many wait then."""
-    room, cells, even, waiting, spots, layers, samples, lamp, shadow, matrix = tile
+    room, even, waiting, spots, layers, samples, lamp, shadow, matrix = tile
     if count > 0:
         _look_up(waiting, count, lamp, shadow, matrix)
         _shade(waiting, count, lamp)
@@ -85,30 +84,30 @@ def flush(tile, count):
         p, mask, alpha = spots[0, i], spots[1, i], waiting[ALPHA + i]
         r, g, b = waiting[R + i], waiting[G + i], waiting[B + i]
         if mask == full and alpha == ONE:
-            cells[0, 0, p], cells[0, 1, p], cells[0, 2, p] = r, g, b
+            room[RED + p], room[GREEN + p], room[BLUE + p] = r, g, b
             even[p] = True
             continue
         if mask != 0:
-            spread(cells, even, p, samples)
+            spread(room, even, p, samples)
         for k in range(samples if mask != 0 else layers):
             share = alpha
             if mask == 0:
                 share *= shown(room, k * BLOCK + p, waiting[W + i], waiting[SHARP + i])
             elif not mask & (1 << k):
                 continue
-            cells[k, 0, p] += share * (r - cells[k, 0, p])
-            cells[k, 1, p] += share * (g - cells[k, 1, p])
-            cells[k, 2, p] += share * (b - cells[k, 2, p])
+            room[k * BLOCK + RED + p] += share * (r - room[k * BLOCK + RED + p])
+            room[k * BLOCK + GREEN + p] += share * (g - room[k * BLOCK + GREEN + p])
+            room[k * BLOCK + BLUE + p] += share * (b - room[k * BLOCK + BLUE + p])
     return NONE
 
 
 @inner
-def spread(cells, even, p, samples):
+def spread(room, even, p, samples):
     """Give each sample of a pixel its own light, before they part."""
     if even[p]:
         for k in range(1, samples):
             for channel in range(3):
-                cells[k, channel, p] = cells[0, channel, p]
+                room[k * BLOCK + channel * LINE + p] = room[channel * LINE + p]
         even[p] = False
 
 
