@@ -317,6 +317,10 @@ BAD_RENDERS: list[tuple[str, list[str], str]] = [
     ("--frame", ["-o", "x.png", "--frame", "4"], "--frame 4 is not allowed: there are 4 frames, counted from 0"),
     ("--frame negative", ["-o", "x.png", "--frame", "-1"], "--frame -1 is not allowed"),
     ("--frame film", ["-o", "x.mp4", "--frame", "1"], "--frame belongs to a single picture"),
+    ("text in a name", ["-o", "x_%s.png"], "one number"),
+    ("two numbers in a name", ["-o", "x_%d_%d.png"], "one number"),
+    ("long name", ["-o", "x" * 300 + ".mp4"], "name"),
+    ("odd size", ["-o", "x.mp4", "--size", "641x360"], "even"),
     ("--size", ["-o", "x.mp4", "--size", "large"], "--size 'large' is not allowed"),
     ("--size 0", ["-o", "x.mp4", "--size", "0x100"], "size"),
     ("--size huge", ["-o", "x.mp4", "--size", "999999x999999"], "size"),
@@ -363,7 +367,8 @@ def test_bad_options(old_files: Path, arguments: list[str], sentence: str) -> No
 
 
 @pytest.mark.parametrize(("arguments", "sentence"), [b[1:] for b in BAD_RENDERS], ids=[b[0] for b in BAD_RENDERS])
-def test_bad_renders(old_files: Path, arguments: list[str], sentence: str) -> None:
+def test_bad_renders(old_files: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], sentence: str) -> None:
+    monkeypatch.setattr(pm.Simulation, "frame", lambda *_: pytest.fail("it is simulated before it is refused"))
     assert_refused(old_files, ["render", "a.toml", *arguments], sentence)
 
 

@@ -9,7 +9,7 @@ from render_scenes import FRONT, everything, frame, square
 
 from pointmass.errors import InvalidInput
 from pointmass.frame import Points
-from pointmass.render import WRITERS, Style, image, write
+from pointmass.render import WRITERS, Style, check_write, image, write
 
 SIZE = (64, 48)
 
@@ -31,7 +31,7 @@ def decoded(path):
 def test_video_comes_back(tmp_path, suffix):
     path = tmp_path / f"film{suffix}"
     calls = []
-    write(film(11), path, fps=24, camera=FRONT, size=(65, 47), progress=calls.append)
+    write(film(11), path, fps=24, camera=FRONT, size=(66, 48), progress=calls.append)
     stream, pictures = decoded(path)
     assert len(pictures) == 11
     assert calls == list(range(1, 12))
@@ -110,15 +110,39 @@ def test_a_film_that_fails_leaves_nothing(tmp_path, error, name):
         ("a.mp4", {"fps": float("nan")}, "fps"),
         ("a.mp4", {"fps": 1e9}, "fps"),
         ("a.mp4", {"fps": "fast"}, "fps"),
-        ("a_%s_%s.png", {}, "sequence"),
-        ("a_%%.png", {}, "sequence"),
+        ("a.mp4", {"fps": 1e-4}, "from 0.001 to 1000"),
+        ("a.mp4", {"size": (65, 48)}, "even"),
+        ("a.webm", {"size": (64, 47)}, "even"),
+        ("a_%s.png", {}, "one number"),
+        ("a_%d_%d.png", {}, "one number"),
+        ("a_%4d.png", {}, "one number"),
+        ("a_%s_%s.png", {}, "one number"),
+        ("a_%%.png", {}, "one number"),
+        ("%.png", {}, "one number"),
+        ("a" * 300 + ".mp4", {}, "name"),
     ],
 )
 def test_one_clear_sentence_and_nothing_written(tmp_path, name, options, words):
-    with pytest.raises(InvalidInput, match=words) as caught:
-        write(film(2), tmp_path / name, **{"camera": FRONT, "size": SIZE, **options})
-    assert "\n" not in str(caught.value)
-    assert not list(tmp_path.iterdir())
+    options = {"fps": 60, "size": SIZE, **options}
+    for attempt in (
+        lambda: check_write(tmp_path / name, **options),
+        lambda: write(film(2), tmp_path / name, camera=FRONT, **options),
+    ):
+        with pytest.raises(InvalidInput, match=words) as caught:
+            attempt()
+        assert "\n" not in str(caught.value)
+        assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "size"), [("a.mp4", (2, 2)), ("a.webm", (2, 2)), ("a.gif", (1, 1)), ("a.png", (1, 1)), ("a.MP4", (4, 2))]
+)
+def test_what_is_accepted_can_be_written(tmp_path, name, size):
+    for fps in (0.001, 1000):
+        check_write(tmp_path / name, fps=fps, size=size)
+        assert not list(tmp_path.iterdir())
+        write(film(2), tmp_path / name, fps=fps, camera=FRONT, size=size)
+        (tmp_path / name).unlink()
 
 
 @pytest.mark.parametrize("suffix", sorted(WRITERS))

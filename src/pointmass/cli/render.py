@@ -24,7 +24,7 @@ from pointmass.cli.options import (
 from pointmass.cli.progress import progress
 from pointmass.cli.report import Report, counted
 from pointmass.cli.run import simulate
-from pointmass.errors import Diverged, InvalidInput, number, unknown
+from pointmass.errors import Diverged, InvalidInput, number
 
 if TYPE_CHECKING:
     from pointmass.cache import Cache
@@ -81,13 +81,7 @@ def command(
 
 
 class Drawing:
-    """What to draw and where, checked before anything is simulated.
-
-    Raises
-    ------
-    InvalidInput
-        An option that is not allowed, or a file that cannot be written.
-    """
+    """What to draw, and where."""
 
     def __init__(
         self,
@@ -98,21 +92,26 @@ class Drawing:
         view: dict[str, float | None],
         quiet: bool,
     ) -> None:
-        from pointmass.render.image import checked_size
+        from pointmass.render.film import is_single
 
-        self.path, self.frame, self.caption, self.quiet = path, frame, caption, quiet
-        self.size = checked_size(size)
+        self.path, self.size, self.frame, self.caption, self.quiet = path, size, frame, caption, quiet
         self.view = {name: number(name, value, unit="degrees") for name, value in view.items() if value is not None}
-        self._check_path()
-        self.camera_with(None)
+        self.single = is_single(path)
 
-    @property
-    def single(self) -> bool:
-        """Whether it is one picture."""
-        return self.path.suffix.lower() == ".png" and "%" not in self.path.name
+    def check(self, count: int, fps: float, camera: Camera | None) -> None:
+        """Refuse what cannot be drawn of `count` frames, or written, before anything is simulated.
 
-    def check_frame(self, count: int) -> None:
-        """Refuse a frame that is not there."""
+        Raises
+        ------
+        InvalidInput
+            An option that is not allowed, or a file that cannot be written.
+        """
+        from pointmass.render import check_write
+
+        check_write(self.path, fps=fps, size=self.size)
+        self.camera_with(camera)
+        if self.frame is not None and not self.single:
+            raise InvalidInput(f"--frame belongs to a single picture such as x.png, not to {self.path.name!r}")
         if self.frame is not None and not 0 <= self.frame < count:
             raise InvalidInput(f"--frame {self.frame} is not allowed: there are {counted(count)}, counted from 0")
 
@@ -128,7 +127,6 @@ class Drawing:
         """Draw the frames of a cache; returns how many."""
         from pointmass.render import Style, fit_camera, write
 
-        self.check_frame(len(cache))
         camera = fit_camera(_sample(cache), self.camera_with(cache.camera), self.size)
         last = len(cache) - 1 if self.frame is None else self.frame
         frames: Iterator[Frame] = iter([cache[last]]) if self.single else iter(cache)
@@ -137,19 +135,6 @@ class Drawing:
         with progress("rendering", total, self.quiet) as tick:
             write(frames, self.path, fps=cache.fps, camera=camera, size=self.size, style=style, progress=tick)
         return total
-
-    def _check_path(self) -> None:
-        from pointmass.render import WRITERS
-
-        path = self.path
-        if path.suffix.lower() not in WRITERS:
-            raise unknown("kind of picture or film", path.suffix, WRITERS)
-        if not path.parent.is_dir():
-            raise InvalidInput(f"cannot write {str(path)!r}: there is no folder {str(path.parent)!r}")
-        if path.is_dir():
-            raise InvalidInput(f"cannot write {str(path)!r}: it is a folder")
-        if self.frame is not None and not self.single:
-            raise InvalidInput(f"--frame belongs to a single picture such as x.png, not to {path.name!r}")
 
 
 def _from_cache(source: str, options: RunOptions, drawing: Drawing, report: Report) -> None:
@@ -161,6 +146,7 @@ def _from_cache(source: str, options: RunOptions, drawing: Drawing, report: Repo
     cache = Cache.open(source)
     if not len(cache):
         raise InvalidInput(f"the cache {source!r} has no frames: run the scene again")
+    drawing.check(len(cache), cache.fps, cache.camera)
     report.frames = drawing.draw(cache)
 
 
@@ -169,27 +155,21 @@ def _from_scene(source: str, options: RunOptions, drawing: Drawing, report: Repo
     from pointmass.cache import Cache
 
     scene = load_scene(source, options)
-    number("fps", scene.fps, above=0, at_most=1000, unit="1/s")
-    drawing.check_frame(scene.frames)
+    drawing.check(scene.frames, scene.fps, scene.camera)
     if drawing.frame is not None:
-        options = replace(options, frames=drawing.frame + 1)
-    with _folder_beside(drawing.path) as folder:
+        scene = scene.changed(frames=drawing.frame + 1)
+    with tempfile.TemporaryDirectory(
+        prefix=".pointmass-", dir=drawing.path.parent, ignore_cleanup_errors=True
+    ) as folder:
         cache = Path(folder) / "run.zarr"
         try:
-            simulate(source, options, cache, report, drawing.quiet, overwrite=False)
+            simulate(scene, cache, report, drawing.quiet, overwrite=False)
         except Diverged as error:
             report.diverged = error
             if drawing.frame is not None or not report.frames:
                 report.frames = 0
                 raise Diverged(f"{error}; {str(drawing.path)!r} was not written") from error
         report.frames = drawing.draw(Cache.open(cache))
-
-
-def _folder_beside(path: Path) -> Any:
-    try:
-        return tempfile.TemporaryDirectory(prefix=".pointmass-", dir=path.parent, ignore_cleanup_errors=True)
-    except OSError as error:
-        raise InvalidInput(f"cannot write into folder {str(path.parent)!r}: {error.strerror}") from None
 
 
 def _sample(cache: Cache) -> list[Frame]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,6 +12,9 @@ from pointmass.cli.options import RunOptions, as_json, default_output, load_scen
 from pointmass.cli.progress import progress
 from pointmass.cli.report import Report, counted
 from pointmass.errors import Diverged
+
+if TYPE_CHECKING:
+    from pointmass.scene import Scene
 
 
 @click.command("run")
@@ -30,7 +33,7 @@ def command(scene: str, output: str | None, as_json: bool, quiet: bool, **values
     path = Path(output) if output is not None else default_output(scene, ".zarr")
     report = Report(command="run", path=path)
     try:
-        simulate(scene, options, path, report, quiet, overwrite=True)
+        simulate(load_scene(scene, options), path, report, quiet, overwrite=True)
     except Diverged as error:
         report.diverged = error
         report.show(as_json, quiet)
@@ -43,11 +46,10 @@ def command(scene: str, output: str | None, as_json: bool, quiet: bool, **values
     report.show(as_json, quiet)
 
 
-def simulate(source: str, options: RunOptions, path: Path, report: Report, quiet: bool, *, overwrite: bool) -> None:
+def simulate(scene: Scene, path: Path, report: Report, quiet: bool, *, overwrite: bool) -> None:
     """Simulate a scene into a cache, and count its frames in the report."""
     from pointmass.cache import check_target, record
 
-    scene = load_scene(source, options)
     check_target(path, overwrite)
     simulation = scene.simulation()
     with progress("simulating", scene.frames, quiet) as tick:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import re
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
@@ -25,7 +25,8 @@ Picture = NDArray[np.uint8]
 BT709 = 1  # FFmpeg's number for the colours of HD video
 LIMITED = 1  # luma from 16 to 235
 GIF_TICKS = 100  # a GIF counts time in hundredths of a second
-FASTEST = 1000  # frames per second
+SLOWEST, FASTEST = 0.001, 1000  # frames per second
+NUMBERED = re.compile(r"[^%]*%(0[1-9])?d[^%]*")  # names of a sequence
 
 
 class Writer(Protocol):
@@ -42,16 +43,16 @@ class Writer(Protocol):
 
 
 class Video:
-    """A video file, encoded while the pictures come. Odd sizes get one more column or row."""
+    """A video file, encoded while the pictures come."""
 
     def __init__(self, path: Path, size: tuple[int, int], fps: Fraction, codec: str, options: dict[str, str]) -> None:
         import av
 
-        container_options = {"movflags": "+faststart"} if path.suffix == ".mp4" else {}
+        container_options = {"movflags": "+faststart"} if path.suffix.lower() == ".mp4" else {}
         container: Any = av.open(str(path), "w", options=container_options)
         self._container = container
         self._stream: Any = container.add_stream(codec, rate=fps, options=options)
-        self._stream.width, self._stream.height = (side + side % 2 for side in size)
+        self._stream.width, self._stream.height = size
         self._stream.pix_fmt = "yuv420p"
         # Without these tags players guess, and guess wrong by up to 40 of 255.
         context = self._stream.codec_context
@@ -63,9 +64,6 @@ class Video:
         """Encode one picture."""
         import av
 
-        odd = [(0, side % 2) for side in picture.shape[:2]]
-        if any(extra for _, extra in odd):
-            picture = np.pad(picture, [*odd, (0, 0)], mode="edge")
         frame: Any = av.VideoFrame.from_ndarray(picture, format="rgb24")
         frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
         frame.pts = self._count
@@ -148,7 +146,7 @@ class Stills:
     """PNG files: the last picture, or all of them when the name holds a pattern such as %04d."""
 
     def __init__(self, path: Path, size: tuple[int, int], fps: Fraction) -> None:
-        self._path, self._sequence = path, "%" in path.name
+        self._path, self._sequence = path, not is_single(path)
         self._last: Picture | None = None
 
     def add(self, picture: Picture, number: int) -> None:
@@ -181,12 +179,55 @@ def _webm(path: Path, size: tuple[int, int], fps: Fraction) -> Writer:
     return Video(path, size, fps, "libvpx-vp9", options)
 
 
-WRITERS: dict[str, Callable[[Path, tuple[int, int], Fraction], Writer]] = {
-    ".gif": Gif,
-    ".mp4": _mp4,
-    ".png": Stills,
-    ".webm": _webm,
-}
+Maker = Callable[[Path, tuple[int, int], Fraction], Writer]
+WRITERS: dict[str, Maker] = {".gif": Gif, ".mp4": _mp4, ".png": Stills, ".webm": _webm}
+EVEN = (".mp4", ".webm")  # colours are stored for two by two pixels
+
+
+def is_single(path: Path) -> bool:
+    """Whether a file of this name is one picture, not a film nor a sequence."""
+    return path.suffix.lower() == ".png" and "%" not in path.name
+
+
+def check_write(
+    path: str | Path, *, fps: float | Fraction = 60, size: tuple[int, int] = (1280, 720)
+) -> tuple[Maker, Fraction, tuple[int, int]]:
+    """What makes the writer for this name, and the checked rate and size: all that `write` refuses, before any work.
+
+    Raises
+    ------
+    InvalidInput : as for `write`.
+    """
+    target = Path(path)
+    suffix = target.suffix.lower()
+    if suffix not in WRITERS:
+        raise unknown("kind of picture or film", target.suffix, WRITERS)
+    if suffix == ".png" and not (is_single(target) or NUMBERED.fullmatch(target.name)):
+        raise InvalidInput(f"cannot write {target.name!r}: a sequence needs one number, such as x_%04d.png")
+    width, height = size = checked_size(size)
+    if suffix in EVEN and (width % 2 or height % 2):
+        near = f"{width + width % 2}x{height + height % 2}"
+        raise InvalidInput(f"size = {width}x{height} is not allowed: {suffix} needs even numbers, such as {near}")
+    rate = _rate(fps)
+    _check_place(target)
+    return WRITERS[suffix], rate, size
+
+
+def _check_place(target: Path) -> None:
+    """Refuse a place where no file of this name can appear, by making one in a folder that goes at once."""
+    if not target.parent.is_dir():
+        raise InvalidInput(f"cannot write {str(target)!r}: there is no folder {str(target.parent)!r}")
+    try:
+        folder = tempfile.TemporaryDirectory(prefix=_hidden(target), dir=target.parent)
+    except OSError as error:
+        raise InvalidInput(f"cannot write into folder {str(target.parent)!r}: {error.strerror}") from None
+    with folder:
+        try:
+            (Path(folder.name) / target.name).touch()
+        except OSError as error:
+            raise InvalidInput(f"cannot write a file of the name {target.name!r}: {error.strerror}") from None
+    if target.is_dir():
+        raise InvalidInput(f"cannot write {str(target)!r}: it is a folder")
 
 
 def write(
@@ -205,9 +246,9 @@ def write(
     ----------
     frames : read once, one at a time.
     path : `.mp4`, `.webm`, `.gif`, or `.png`: the last frame, or a numbered sequence for a name such as `x_%04d.png`.
-    fps : pictures per second, above 0 and up to 1000.
+    fps : pictures per second, from 0.001 to 1000.
     camera : what it leaves open is chosen to show all frames when they are a list, else the first one.
-    size : width and height [pixels].
+    size : width and height [pixels], even for `.mp4` and `.webm`.
     style : the look.
     progress : called with the number of frames drawn so far, after each.
 
@@ -216,18 +257,13 @@ def write(
     InvalidInput : the suffix is not known, the folder cannot be written, there are no frames, or the size or the rate
         is out of range. Nothing is written then, nor when the frames or an interrupt raise.
     """
+    make, rate, size = check_write(path, fps=fps, size=size)
     target = Path(path)
-    writer = _checked(target)
-    rate = _rate(fps)
-    size = checked_size(size)
     if isinstance(frames, Sequence):
         camera = fit_camera(frames, camera, size) if len(frames) else camera
+    folder = Path(tempfile.mkdtemp(prefix=_hidden(target), dir=target.parent))
     try:
-        folder = Path(tempfile.mkdtemp(prefix=f".{target.stem[:32].replace('%', '_')}-", dir=target.parent))
-    except OSError as error:
-        raise InvalidInput(f"cannot write into folder {str(target.parent)!r}: {error.strerror}") from None
-    try:
-        _draw(frames, writer(folder / target.name, size, rate), camera, size, style, progress)
+        _draw(frames, make(folder / target.name, size, rate), camera, size, style, progress)
         for made in sorted(folder.iterdir()):
             made.replace(target.parent / made.name)
     finally:
@@ -270,32 +306,17 @@ def _draw(
     writer.close()
 
 
-def _checked(target: Path) -> Callable[[Path, tuple[int, int], Fraction], Writer]:
-    """The writer for the name's suffix."""
-    writer = WRITERS.get(target.suffix.lower())
-    if writer is None:
-        raise unknown("kind of picture or film", target.suffix, WRITERS)
-    if not target.parent.is_dir():
-        raise InvalidInput(f"cannot write {str(target)!r}: there is no folder {str(target.parent)!r}")
-    if target.is_dir():
-        raise InvalidInput(f"cannot write {str(target)!r}: it is a folder")
-    if writer is Stills and "%" in target.name:
-        try:
-            numbered = target.name % 1 != target.name % 2
-        except (TypeError, ValueError):
-            numbered = False
-        if not numbered:
-            raise InvalidInput(f"cannot write {target.name!r}: a sequence needs one number, such as x_%04d.png")
-    return writer
-
-
 def _rate(fps: float | Fraction) -> Fraction:
     """Frames per second as a fraction with a small denominator: 29.97 becomes 30000/1001 or near it."""
     try:
-        valid = math.isfinite(fps) and 0 < fps <= FASTEST
+        valid = SLOWEST <= fps <= FASTEST
     except TypeError:
         valid = False
-    rate = Fraction(fps).limit_denominator(1001) if valid else Fraction(0)
-    if rate <= 0:
-        raise InvalidInput(f"fps = {fps} is not allowed: it must be above 0 and at most {FASTEST}")
-    return rate
+    if not valid:
+        raise InvalidInput(f"fps = {fps} is not allowed: it must be from {SLOWEST} to {FASTEST}")
+    return Fraction(fps).limit_denominator(1001)
+
+
+def _hidden(target: Path) -> str:
+    """How the name of a folder for unfinished files begins."""
+    return f".{target.stem[:32].replace('%', '_')}-"
