@@ -58,15 +58,23 @@ def unknown(what: str, name: object, known: Iterable[str]) -> InvalidInput:
     names = sorted(known)
     near = get_close_matches(str(name), names, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
-    return InvalidInput(f"unknown {what} {name!r}: {hint}known are {', '.join(names)}")
+    return InvalidInput(f"unknown {what} {name!r}: {hint}known are {', '.join(names) or 'none'}")
+
+
+def floats(value: Any) -> np.ndarray | None:
+    """`value` as a new float64 array; None for text, complex numbers, and rows of different lengths."""
+    try:
+        array = np.asarray(value)
+        return np.array(array, np.float64) if array.dtype.kind in "biufO" else None
+    except (TypeError, ValueError, OverflowError):
+        return None
 
 
 def finite_array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
     """`value` as a float64 array of `shape` (None = any length) without NaN or infinity."""
-    try:
-        array = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidInput(f"{name} must be numbers of shape {_shape(shape)}, not {_short(value)}") from None
+    array = floats(value)
+    if array is None:
+        raise InvalidInput(f"{name} must be numbers of shape {_shape(shape)}, not {shown(value)}")
     if array.ndim != len(shape) or any(
         want is not None and want != got for want, got in zip(shape, array.shape, strict=True)
     ):
@@ -90,7 +98,9 @@ def number(
     try:
         result = float(value)
     except (TypeError, ValueError):
-        raise InvalidInput(f"{name} must be a number, not {_short(value)}") from None
+        raise InvalidInput(f"{name} must be a number, not {shown(value)}") from None
+    except OverflowError:  # a whole number of Python that no float holds
+        result = value = math.inf
     bounds = [
         text
         for bound, text in (
@@ -119,11 +129,15 @@ def whole_number(name: str, value: Any, *, at_least: int) -> int:
     return int(value)
 
 
+def shown(value: object) -> str:
+    """A value for a message: one line, arrays too, cut off where it is long."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # a whole number of more digits than Python writes
+        text = f"{type(value).__name__} of very many digits"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
 def _shape(shape: tuple[int | None, ...]) -> str:
     names = ["n" if s is None else str(s) for s in shape]
     return "(" + ", ".join(names) + ("," if len(names) == 1 else "") + ")"
-
-
-def _short(value: object) -> str:
-    text = " ".join(repr(value).split())  # one line, arrays too
-    return text if len(text) <= 60 else text[:57] + "..."

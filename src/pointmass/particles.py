@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from keyword import iskeyword
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from pointmass.errors import InvalidInput, finite_array, unknown
+from pointmass.errors import InvalidInput, finite_array, floats, shown, unknown
 
 Array = NDArray[np.floating[Any]]
-Selection = str | ArrayLike | None  # a group's name, a mask, rows; None = all
+Selection = str | slice | ArrayLike | None  # a group's name, a mask, rows; None = all
 FIRST_FOREIGN_ID = 2**40  # ids from here on are made by emitters, and leave no mark on the count
-NOT_ATTRIBUTES = ("t", "y", "z", "vx", "vy", "vz", "e", "pi")  # these mean something else in formulas
+NOT_ATTRIBUTES = ("t", "y", "z", "vx", "vy", "vz", "e", "pi", "dtype", "self")  # these mean something else
 FIELDS = ("x", "v", "f", "m", "w", "age", "radius", "id")
 
 
@@ -54,9 +55,7 @@ class Particles:
         dtype: DTypeLike = np.float64,
         **attributes: ArrayLike,
     ) -> None:
-        self.dtype = np.dtype(dtype)
-        if self.dtype not in (np.float64, np.float32):
-            raise InvalidInput(f"dtype = {dtype} is not allowed: it must be float64 or float32")
+        self.dtype = _dtype(dtype)
         self.attributes: dict[str, Array] = {}
         self.groups: dict[str, NDArray[np.bool_]] = {}
         self.version = 0
@@ -66,7 +65,7 @@ class Particles:
         self.m, self.w, self.radius, self.age = (np.zeros(0, self.dtype) for _ in range(4))
         self.id = np.zeros(0, np.int64)
         for name in attributes:
-            self.attributes[_attribute_name(name)] = np.zeros(0, self.dtype)
+            self.attributes[attribute_name(name)] = np.zeros(0, self.dtype)
         self.add(x, v, m, radius, **attributes)
 
     def __len__(self) -> int:
@@ -153,7 +152,7 @@ class Particles:
 
         Parameters
         ----------
-        which : a group's name, a mask of shape (n,), rows, or None for all.
+        which : a group's name, a mask of shape (n,), rows counted from 0, a slice of them, or None for all.
 
         Raises
         ------
@@ -167,16 +166,19 @@ class Particles:
             if which not in self.groups:
                 raise unknown("group of particles", which, self.groups)
             return np.flatnonzero(self.groups[which])
-        rows = np.atleast_1d(np.asarray(which))
+        try:
+            rows = np.arange(n)[which] if isinstance(which, slice) else np.atleast_1d(np.asarray(which))
+        except (TypeError, ValueError):
+            rows = np.full(1, np.nan)
         if rows.dtype == bool:
             if rows.shape != (n,):
                 raise InvalidInput(f"a mask of particles must have shape ({n},), not {rows.shape}")
             return np.flatnonzero(rows)
         if rows.size == 0:
             return np.zeros(0, np.intp)
-        if not np.issubdtype(rows.dtype, np.integer) or rows.min() < -n or rows.max() >= n:
-            raise InvalidInput(f"rows of particles must be whole numbers below {n}, not {which!r}")
-        return np.unique(rows % n)
+        if rows.ndim > 1 or rows.dtype.kind not in "iu" or rows.min() < 0 or rows.max() >= n:
+            raise InvalidInput(f"rows of particles must be whole numbers below {n}, counted from 0, not {shown(which)}")
+        return np.unique(rows.astype(np.intp))
 
     def tag(self, name: str, which: Selection) -> None:
         """Give a selection a name, to be used wherever particles are selected."""
@@ -224,9 +226,12 @@ class Particles:
     def _new_ids(self, n: int, ids: ArrayLike | None) -> NDArray[np.int64]:
         if ids is None:
             ids = np.arange(self._next_id, self._next_id + n)
-        result = np.asarray(ids, np.int64)
+        given = np.asarray(ids)
+        if given.size and given.dtype.kind not in "iu":
+            given = np.zeros(0)
+        result = given.astype(np.int64)
         if result.shape != (n,) or len(np.unique(result)) != n or np.isin(result, self.id).any():
-            raise InvalidInput(f"id must be {n} numbers that no other particle has")
+            raise InvalidInput(f"id must be {n} whole numbers that no other particle has")
         return result
 
     def _cast(self, name: str, values: Array) -> Array:
@@ -237,33 +242,46 @@ class Particles:
         return result
 
 
-def _attribute_name(name: str) -> str:
+def attribute_name(name: object) -> str:
+    """The name of a further column, if it is one that formulas can say and that means nothing else.
+
+    Raises
+    ------
+    InvalidInput
+        The name of a column that all particles have, or no word at all.
+    """
     taken = (*FIELDS, *NOT_ATTRIBUTES)
-    if not name.isidentifier() or name in taken:
+    if not isinstance(name, str) or not name.isidentifier() or iskeyword(name) or name in taken:
         raise InvalidInput(f"particle attribute {name!r} is not allowed: use a word that is not {', '.join(taken)}")
     return name
 
 
+def _dtype(dtype: DTypeLike) -> np.dtype[Any]:
+    try:
+        result = np.dtype(dtype)
+    except TypeError:
+        result = np.dtype(object)
+    if result not in (np.float64, np.float32):
+        raise InvalidInput(f"dtype = {dtype} is not allowed: it must be float64 or float32")
+    return result
+
+
 def _points(name: str, value: ArrayLike, n: int | None = None) -> Array:
-    if np.size(np.asarray(value, dtype=object)) == 0:
+    array = floats(value)
+    if array is None:
+        return finite_array(name, value, (n, 3))  # says what is wrong
+    if array.size == 0:
         return finite_array(name, np.zeros((0, 3)), (n, 3))
-    array = np.atleast_2d(np.asarray(value, dtype=object if _ragged(value) else None))
-    if array.ndim == 2 and array.shape[1] == 2 and array.dtype != object:
+    array = np.atleast_2d(array)
+    if array.ndim == 2 and array.shape[1] == 2:
         array = np.column_stack([array, np.zeros(len(array))])
     if n is not None and array.shape == (1, 3):
         array = np.repeat(array, n, axis=0)
     return finite_array(name, array, (n, 3))
 
 
-def _ragged(value: ArrayLike) -> bool:
-    try:
-        np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        return True
-    return False
-
-
 def _column(name: str, value: ArrayLike, n: int) -> Array:
-    if np.ndim(value) == 0:
-        return np.full(n, finite_array(name, value, ()))
+    array = floats(value)
+    if array is not None and array.ndim == 0:
+        return np.full(n, finite_array(name, array, ()))
     return finite_array(name, value, (n,))

@@ -23,7 +23,7 @@ from pointmass.bodies import BODIES
 from pointmass.collisions import COLLIDERS
 from pointmass.description import parameters_of
 from pointmass.emitters import EMITTERS
-from pointmass.errors import InvalidInput, unknown
+from pointmass.errors import InvalidInput, shown, unknown
 from pointmass.forces import FORCES
 from pointmass.frame import Camera
 from pointmass.laws.unary import VelocityField
@@ -320,12 +320,6 @@ def _check_numbers(value: Any, path: str = "") -> None:
     items = value.items() if isinstance(value, Mapping) else enumerate(value) if isinstance(value, list) else ()
     for key, item in items:
         _check_numbers(item, f"{path}.{key}" if path else str(key))
-
-
-def shown(value: Any) -> str:
-    """A value for a message, cut off where it is long, in one line."""
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _listed(choices: Sequence[Any]) -> str:

@@ -122,9 +122,30 @@ def test_join_shifts_springs_and_names_groups() -> None:
         (lambda: pm.points([[0, 0, np.nan]]), "x must be finite"),
         (lambda: pm.points([[0, 0, 0]], m=0.0), "m = 0.0 of particle 0"),
         (lambda: pm.points([[0, 0, 0]], pinned=[3]), "rows of particles"),
+        (lambda: pm.points([[0, 0, 0]], pinned=[0.0]), "rows of particles"),
+        (lambda: pm.points([[0, 0, 0]], pinned=[[0], [0, 1]]), "rows of particles"),
+        (lambda: pm.points([[0, 0, 0]], pinned="top"), "group of particles 'top'"),
+        (lambda: pm.points([[0, 0, 0]], attributes=[1.0]), "attributes must be columns by name"),
+        (lambda: pm.points([[0, 0, 0]], attributes={"charge": [[1], [1, 2]]}), "charge must be numbers"),
+        (lambda: pm.chain(3, pinned=[0]), "unknown value of pinned"),  # type: ignore[arg-type]
+        (lambda: pm.scatter(3, seed=-1), "seed = -1"),
+        (lambda: pm.scatter(3, size=(-1, 1, 1)), "size"),
         (pm.points, "needs the parameter 'x'"),
     ],
 )
 def test_bad_bodies_are_refused_in_one_sentence(build: object, sentence: str) -> None:
     with pytest.raises(InvalidInput, match=sentence):
         build()  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("name", ["x", "v", "m", "f", "w", "radius", "age", "id", "dtype", "self", "t", "", 1])
+def test_no_attribute_has_the_name_of_a_column(name: object) -> None:
+    with pytest.raises(InvalidInput, match=f"particle attribute {name!r} is not allowed: use a word"):
+        pm.points([[0, 0, 0]], attributes={name: 1.0})  # type: ignore[dict-item]
+
+
+def test_pinned_takes_what_selects_particles() -> None:
+    for pinned in (1, [1], (1,), range(1, 2), [False, True], np.array([1])):
+        assert pm.points(np.eye(3)[:2], pinned=pinned).particles.pinned.tolist() == [False, True]
+    for pinned in (None, (), []):
+        assert not pm.points(np.eye(3)[:2], pinned=pinned).particles.pinned.any()

@@ -43,7 +43,7 @@ def chain(
     step = number("length", length, above=0, unit="m") / links
     line = np.outer(np.arange(links + 1) * step, unit("direction", direction))
     held = {"start": [0], "end": [links], "both": [0, links], "none": []}
-    if pinned not in held:
+    if pinned not in list(held):
         raise unknown("value of pinned", pinned, held)
     m = number("mass", mass, above=0, unit="kg") / (links + 1 - len(held[pinned]) or 1)
     particles = Particles(finite_array("start", start, (3,)) + line, m=m, radius=radius)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from pointmass.bodies.body import Body, body
-from pointmass.particles import Particles
+from pointmass.errors import InvalidInput, shown
+from pointmass.particles import Particles, attribute_name
 
 
 @body
@@ -27,6 +29,9 @@ def points(
     pinned : rows of particles that are held.
     attributes : further columns by name, such as charge.
     """
-    particles = Particles(x, v, m, radius, **(attributes or {}))
-    particles.pin(list(pinned))
+    further = {} if attributes is None else attributes
+    if not isinstance(further, Mapping):
+        raise InvalidInput(f'attributes must be columns by name, such as {{"charge": 1.0}}, not {shown(further)}')
+    particles = Particles(x, v, m, radius, **{attribute_name(name): column for name, column in further.items()})
+    particles.pin(() if pinned is None else pinned)
     return Body(particles)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pointmass import random
 from pointmass.bodies.body import Body, body
-from pointmass.errors import finite_array, number, whole_number
+from pointmass.errors import InvalidInput, finite_array, number, whole_number
 from pointmass.particles import Particles
 
 
@@ -36,11 +36,15 @@ def scatter(
     seed : another one gives another spread.
     """
     count = whole_number("count", count, at_least=1)
+    seed = whole_number("seed", seed, at_least=0)
+    edges = finite_array("size", size, (3,))
+    if (edges < 0).any():
+        raise InvalidInput(f"size = {size} is not allowed: each edge must be at least 0 [m]")
     mean = number("radius", radius, at_least=0, unit="m")
     half = number("radius_range", radius_range, at_least=0, at_most=mean, unit="m")
     ids = np.arange(count)
     place = np.stack([random.uniform(seed, "scatter", ids, axis)[:, 0] for axis in "xyz"], axis=1)
-    x = finite_array("center", center, (3,)) + (place - 0.5) * finite_array("size", size, (3,))
+    x = finite_array("center", center, (3,)) + (place - 0.5) * edges
     v = number("speed", speed, at_least=0, unit="m/s") * random.direction(seed, "scatter", ids, "direction")
     r = random.spread(seed, "scatter", ids, "radius", mean, half)
     mass = number("m", m, above=0, unit="kg") * (np.maximum(r / mean, 1e-3) ** 3 if mean else np.ones(count))

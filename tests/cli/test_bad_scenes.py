@@ -1,0 +1,31 @@
+"""Scene files that cannot be run: one sentence on stderr, exit code 2, nothing written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from pointmass.cli import main
+
+POINTS = '[[bodies]]\ntype = "points"\nx = [[0.0, 1.0, 0.0]]\n'
+BAD = {
+    "an attribute of the name of a column": (POINTS + "attributes = {x = 1.0}\n", "particle attribute 'x'"),
+    "a pin counted from the end": (POINTS + "pinned = [-1]\n", "counted from 0, not [-1]"),
+    "a pin of nobody": (POINTS + "pinned = 1\n", "rows of particles"),
+}
+
+
+@pytest.mark.parametrize(("text", "hint"), BAD.values(), ids=BAD)
+def test_one_sentence_and_nothing_written(
+    text: str, hint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.toml").write_text(text)
+    for command in ("check", "run"):
+        done = CliRunner().invoke(main, [command, "bad.toml"], catch_exceptions=False)
+        assert (done.exit_code, done.stdout) == (2, "")
+        assert done.stderr.count("\n") == 1
+        assert hint in done.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["bad.toml"]
