@@ -9,6 +9,7 @@ the particles. Colours are linear-light RGBA; RGB may exceed 1 (light that glows
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import dist
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,6 +19,8 @@ from pointmass.errors import InvalidInput, finite_array, number
 
 Floats = NDArray[np.floating[Any]]
 Ints = NDArray[np.integer[Any]]
+
+NEAREST, FARTHEST = 1e-12, 1e15  # from a camera to its target [m]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -179,7 +182,16 @@ class Camera:
         for name in ("position", "target", "up"):
             if getattr(self, name) is not None:
                 finite_array(f"camera.{name}", getattr(self, name), (3,))
-        for name in ("azimuth", "elevation"):
+        for name in ("azimuth", "elevation", "fov"):
             number(f"camera.{name}", getattr(self, name), unit="degrees")
         if not 1.0 < self.fov < 170.0:
             raise InvalidInput(f"camera.fov = {self.fov} is not allowed: it must lie between 1 and 170 degrees")
+        if not any(self.up):
+            raise InvalidInput(f"camera.up = {self.up} is not allowed: it must be a direction, such as (0, 1, 0)")
+        if self.position is not None and self.target is not None:
+            distance = dist(self.position, self.target)
+            if not NEAREST <= distance <= FARTHEST:
+                raise InvalidInput(
+                    f"camera.position = {self.position} is not allowed: it is {distance:g} m from camera.target, and "
+                    f"must be from {NEAREST:g} to {FARTHEST:g} m away"
+                )

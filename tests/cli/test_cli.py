@@ -273,6 +273,7 @@ BAD_FILES = {
     "nan": SCENE.replace("k = 0.1", "k = nan"),
     "nan in a list": SCENE.replace("0.5, 1.0", "nan, 1.0"),
     "nan in the camera": SCENE + "[camera]\nazimuth = nan\n",
+    "camera on its target": SCENE + "[camera]\nposition = [1, 1, 1]\ntarget = [1, 1, 1]\n",
     "restitution": SCENE + "restitution = 1.2\n",
     "self spring": SCENE + LINE + 'type = "springs"\npairs = [[1, 1]]\n',
     "missing particle": SCENE + LINE + 'type = "springs"\npairs = [[0, 9]]\n',

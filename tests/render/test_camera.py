@@ -119,8 +119,14 @@ def test_direction_of_an_automatic_camera(azimuth, elevation):
         {"target": (1.0, 2.0)},
         {"up": (0, float("inf"), 0)},
         {"azimuth": float("nan")},
+        {"fov": 180.0},
+        {"fov": "wide"},
+        {"up": (0, 0, 0)},
+        {"position": (1, 2, 3), "target": (1.0, 2.0, 3.0)},
+        {"position": (1e16, 0, 0), "target": (0, 0, 0)},
+        {"position": (1e-13, 0, 0), "target": (0, 0, 0)},
     ],
 )
-def test_a_camera_of_no_numbers_is_refused(values: dict[str, object]) -> None:
+def test_a_camera_that_sees_nothing_is_refused(values: dict[str, object]) -> None:
     with pytest.raises(InvalidInput, match=f"camera.{next(iter(values))}"):
         Camera(**values)  # type: ignore[arg-type]

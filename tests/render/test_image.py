@@ -12,7 +12,6 @@ from render_scenes import FRONT, everything, frame, square
 from pointmass.errors import InvalidInput
 from pointmass.frame import Arrows, Camera, Curves, Points, Segments, Triangles
 from pointmass.render import Style, image
-from pointmass.render.camera import look
 
 BLACK = Style(bottom=(0, 0, 0), top=(0, 0, 0), bloom=0.0, pool=0.0)
 SIZE = (160, 120)
@@ -312,11 +311,6 @@ def test_drawables_that_do_not_fit_are_named(drawable):
 def test_style_out_of_range(numbers):
     with pytest.raises(InvalidInput, match="style"):
         Style(**numbers)
-
-
-def test_camera_on_its_target():
-    with pytest.raises(InvalidInput, match="camera"):
-        look(Camera(position=(1, 1, 1), target=(1, 1, 1)), (4, 4))
 
 
 @pytest.mark.parametrize("kind", ["ball", "line"])

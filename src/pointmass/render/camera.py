@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.errors import InvalidInput
 from pointmass.frame import Arrows, Camera, Drawable, Floats, Frame, Points, Triangles
 
 Vector = NDArray[np.float64]
@@ -65,18 +64,11 @@ def turn(vectors: Vector, axes: Vector) -> Vector:
 
 
 def look(camera: Camera, size: tuple[int, int]) -> View:
-    """The view of a camera whose position and target are known.
-
-    Raises
-    ------
-    InvalidInput : position and target coincide, or a number is not finite.
-    """
+    """The view of a camera whose position and target are known."""
     eye = np.asarray(camera.position, dtype=np.float64)
     target = np.asarray(camera.target, dtype=np.float64)
     forward = target - eye
-    distance = float(np.linalg.norm(forward))
-    if not (math.isfinite(distance) and distance > 0.0):
-        raise InvalidInput(f"camera.position = {camera.position} must be finite and differ from camera.target")
+    distance = math.dist(eye, target)
     width, height = size
     focal = 0.5 * height / math.tan(math.radians(camera.fov) / 2.0)
     return View(eye, _axes(forward / distance, camera.up), focal, width, height, NEAR * distance)
@@ -113,9 +105,9 @@ def fit_camera(frames: Iterable[Frame], camera: Camera | None = None, size: tupl
     middle = 0.5 * (low + high)
     if camera.position is not None:
         away = middle - np.asarray(camera.position)
-        target = middle if np.linalg.norm(away) > 0.0 else middle - _direction(camera)
+        target = middle if np.linalg.norm(away) > 0.0 else middle - _to_eye(camera)
         return replace(camera, target=_triple(target))
-    axes = _axes(-_direction(camera), camera.up)
+    axes = _axes(-_to_eye(camera), camera.up)
     slope = math.tan(math.radians(camera.fov) / 2.0) / MARGIN
     slopes = (slope * size[0] / size[1], slope)
     if camera.target is not None:
@@ -130,22 +122,26 @@ def fit_camera(frames: Iterable[Frame], camera: Camera | None = None, size: tupl
 
 def _axes(forward: Vector, up: tuple[float, float, float]) -> Vector:
     """Right, up, forward for a unit vector `forward`; another `up` is taken when the two are parallel."""
-    right = np.cross(forward, np.asarray(up, dtype=np.float64))
+    right = np.cross(forward, direction(up))
     length = float(np.linalg.norm(right))
-    if not length > 1e-9 * max(float(np.linalg.norm(up)), 1e-300):
+    if not length > 1e-9:
         right = np.cross(forward, (0.0, 0.0, -1.0) if abs(forward[2]) < 0.9 else (1.0, 0.0, 0.0))
         length = float(np.linalg.norm(right))
     right = right / length
     return np.stack((right, np.cross(right, forward), forward))
 
 
-def _direction(camera: Camera) -> Vector:
+def direction(vector: tuple[float, float, float]) -> Vector:
+    """The direction of a vector of any length but zero."""
+    rows = np.asarray(vector, dtype=np.float64)
+    rows = rows / np.abs(rows).max()
+    result: Vector = rows / np.linalg.norm(rows)
+    return result
+
+
+def _to_eye(camera: Camera) -> Vector:
     """Unit vector from the scene to an automatic camera: azimuth about the camera's up, 0 looks along -z."""
-    up = np.asarray(camera.up, dtype=np.float64)
-    length = float(np.linalg.norm(up))
-    if not (math.isfinite(length) and length > 0.0):
-        raise InvalidInput(f"camera.up = {camera.up} is not allowed: it must be a finite direction")
-    up = up / length
+    up = direction(camera.up)
     back = np.array((0.0, 0.0, 1.0)) - up[2] * up
     if np.linalg.norm(back) < 1e-6:
         back = np.array((0.0, -1.0, 0.0)) + up[1] * up

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from pointmass.frame import Camera
-from pointmass.render.camera import View, turn
+from pointmass.render.camera import View, direction, turn
 from pointmass.render.shadow import Shadow
 from pointmass.render.style import Style
 from pointmass.render.tables import F32, F64
@@ -32,8 +32,7 @@ def key_direction(style: Style, view: View) -> F64:
 def lamp(style: Style, view: View, camera: Camera, shadow: Shadow) -> F32:
     """The numbers, shape (22,)."""
     scale = float(np.sqrt((shadow.matrix[0, :3].astype(np.float64) ** 2).sum()))
-    above = np.asarray(camera.up, dtype=np.float64)
-    above = turn((above / np.sqrt((above * above).sum()))[None], view.axes)[0]
+    above = turn(direction(camera.up)[None], view.axes)[0]
     lift = LIFT / scale if scale > 0.0 else 0.0
     distance = float(np.sqrt(((np.asarray(camera.target) - view.eye) ** 2).sum()))
     radius = style.pool * distance * 0.5 * view.height / view.focal
