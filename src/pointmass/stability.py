@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.errors import InvalidInput
-from pointmass.solvers.base import Solver
-from pointmass.solvers.stability import largest_safe_step
+from pointmass.solvers.base import Array, Solver
+from pointmass.solvers.stability import Complex, largest_safe_step, safe_step
 
 if TYPE_CHECKING:
     from pointmass.system import ParticleSystem
@@ -47,27 +48,25 @@ def stability(system: ParticleSystem, solver: Solver) -> Stability:
     Raises
     ------
     InvalidInput
-        A force has no Jacobian (a NumPy function that couples particles).
+        A force has no Jacobian (a NumPy function that couples particles), or is not finite.
     """
-    parts = spectra(system)
-    values = np.concatenate(parts)
-    fast = values[np.argmax(np.abs(values))] if len(values) else 0.0
+    matrix = _linearised(system)
+    found = _modes(system, matrix)
+    fast = found.values[np.abs(found.values).argmax()] if len(found.values) else 0.0
     size = float(np.abs(fast))
+    limit = largest_safe_step(solver, found.stiffness, found.damping)
+    if system.order == 2:
+        limit = safe_step(solver, matrix, limit, found.growth)
     return Stability(
-        largest_safe_dt=float(largest_safe_step(solver, *parts)),
+        largest_safe_dt=limit,
         frequency=size,
         damping_ratio=float(-np.real(fast) / size) if size > 0 else 0.0,
         period=2 * math.pi / size if size > 0 else math.inf,
     )
 
 
-def eigenvalues(system: ParticleSystem) -> NDArray[np.complex128]:
-    """Eigenvalues of d(deriv_eval)/dy now [1/s], of all islands (see `spectra`)."""
-    return np.concatenate(spectra(system))
-
-
-def spectra(system: ParticleSystem) -> list[NDArray[np.complex128]]:
-    """Eigenvalues of d(deriv_eval)/dy now [1/s], one array for each island that is different from the others.
+def eigenvalues(system: ParticleSystem) -> Complex:
+    """Eigenvalues of d(deriv_eval)/dy now [1/s], of all islands that are different from each other.
 
     All of them; where that is too much work, those of largest size, of largest frequency and of strongest damping.
 
@@ -76,70 +75,143 @@ def spectra(system: ParticleSystem) -> list[NDArray[np.complex128]]:
     InvalidInput
         The forces are not finite, or have no Jacobian, or the iteration does not converge.
     """
+    return _modes(system, _linearised(system)).values
+
+
+class Modes(NamedTuple):
+    """Motions x'' = -stiffness x - damping x' of a linear system.
+
+    Attributes
+    ----------
+    values : eigenvalues [1/s], shape (k,).
+    stiffness, damping : of the motion that each belongs to [1/s^2, 1/s], shape (k,).
+    growth : bound of the real parts of all eigenvalues, not of these only [1/s].
+    """
+
+    values: Complex
+    stiffness: Complex
+    damping: Complex
+    growth: float
+
+
+def _linearised(system: ParticleSystem) -> Any:
+    """d(deriv_eval)/dy now, for x and v times the root of the mass: symmetric where forces have a potential."""
+    from scipy.sparse import csr_array, diags_array
+
     if not len(system.particles):
-        return [np.zeros(0, complex)]
-    matrix = system.jacobian(system.t, system.get_state())
+        return csr_array((0, 0))
+    matrix = system.jacobian(system.t, system.get_state()).astype(np.float64)
     if not np.isfinite(matrix.data).all():
         raise InvalidInput("the forces are not finite where the particles are now: there is no largest step")
-    islands = system.islands
-    sizes = np.bincount(islands).astype(float)
-    if sizes.max() <= DENSE and (sizes**3).sum() <= WORK * DENSE**3:
-        return _dense(matrix, islands)
-    return [_extreme(matrix.astype(np.float64), system.inertia if system.order == 2 else None)]
+    if system.order == 1:
+        return matrix
+    root = np.tile(np.sqrt(np.where(np.isfinite(system.inertia), system.inertia, 1.0)), 2)
+    return (diags_array(root) @ matrix @ diags_array(1.0 / root)).tocsr()
 
 
-def _dense(matrix: Any, islands: NDArray[np.intp]) -> list[NDArray[np.complex128]]:
-    """All eigenvalues: one block for each island, islands of equal size at once."""
+def _modes(system: ParticleSystem, matrix: Any) -> Modes:
+    sizes = np.bincount(system.islands).astype(float)
+    if sizes.max(initial=0.0) <= DENSE and (sizes**3).sum() <= WORK * DENSE**3:
+        found = [_of_blocks(blocks, system.order) for blocks in _blocks(matrix, system.islands)]
+    else:
+        found = [_extreme(matrix, system.order)]
+    values, stiffness, damping, growth = zip(*found, strict=True) if found else ([], [], [], [])
+    return Modes(_joined(values), _joined(stiffness), _joined(damping), max(growth, default=0.0))
+
+
+def _joined(parts: Sequence[Complex]) -> Complex:
+    return np.concatenate([np.zeros(0, complex), *(part.ravel() for part in parts)])
+
+
+def _blocks(matrix: Any, islands: NDArray[np.intp]) -> Iterator[Array]:
+    """The part of each island that is different from the others, those of equal size at once: shape (k, size, size)."""
     entries = matrix.tocoo()
     row, column = entries.coords
     sizes = np.bincount(islands)
     order = np.argsort(islands, kind="stable")
     place = np.empty(len(islands), np.intp)  # of each entry within its island
     place[order] = np.arange(len(islands)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-    found: list[NDArray[np.complex128]] = []
     for size in np.unique(sizes):
         number = np.cumsum(sizes == size) - 1
         mine = sizes[islands[row]] == size
         blocks = np.zeros((int((sizes == size).sum()), size, size))
         blocks[number[islands[row[mine]]], place[row[mine]], place[column[mine]]] = entries.data[mine]
-        for block in np.unique(blocks, axis=0):
-            values = np.linalg.eigvals(block).astype(np.complex128)
-            found.append(values if block[size // 2 :, : size // 2].any() else _strongest_drag(values))
-    return found
+        yield np.stack(list({block.tobytes(): block for block in blocks}.values()))
 
 
-def _strongest_drag(values: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Of a part without stiffness, where each real eigenvalue is a drag by itself: the others are slower."""
-    real = values.imag == 0
-    return np.concatenate([values[~real], values[real][np.argsort(values[real].real)[:1]]])
+def _of_blocks(blocks: Array, order: int) -> Modes:
+    """All modes."""
+    n = blocks.shape[-1] // 2
+    pull, damping = -blocks[:, n:, :n], -blocks[:, n:, n:]
+    if order == 2 and _is_symmetric(pull) and not damping.any():
+        return _undamped(np.linalg.eigvalsh(pull))
+    values, vectors = np.linalg.eig(blocks)
+    growth = float(values.real.max(initial=0.0))
+    return _first_order(values, growth) if order == 1 else _damped(values, vectors[:, :n], damping, growth)
 
 
-def _extreme(matrix: Any, inertia: NDArray[np.floating[Any]] | None) -> NDArray[np.complex128]:
-    """The eigenvalues that limit steps, by ARPACK's iterations from a fixed vector: the same answer each time.
-
-    Without damping, x'' = -K x with M K symmetric, the frequencies are roots of eigenvalues of a symmetric matrix.
-    """
-    from scipy.sparse import diags_array
+def _extreme(matrix: Any, order: int) -> Modes:
+    """The modes that limit steps, by ARPACK's iterations from a fixed vector: the same answer each time."""
     from scipy.sparse.linalg import ArpackNoConvergence, eigs, eigsh
 
-    start = np.cos(np.arange(matrix.shape[0]))
-    if inertia is not None:
-        n = len(inertia)
-        pull, damping = matrix[n:, :n], matrix[n:, n:]
-        root = diags_array(np.sqrt(np.where(np.isfinite(inertia), inertia, 1.0)))
-        stiff = -(root @ pull @ diags_array(1 / root.diagonal()))
-        if not damping.count_nonzero() and abs(stiff - stiff.T).max() <= ACCURACY * abs(stiff).max():
-            squares = eigsh(stiff, k=WANTED, which="LA", v0=start[:n], tol=ACCURACY, return_eigenvectors=False)
-            return np.concatenate([sign * np.sqrt(squares.astype(complex)) for sign in (1j, -1j)])
-    found: list[NDArray[np.complex128]] = []
-    values: NDArray[Any]
+    start, n = np.cos(np.arange(matrix.shape[0])), matrix.shape[0] // 2
+    pull, damping = -matrix[n:, :n], -matrix[n:, n:]
+    growth = 0.0
+    if order == 2 and _is_symmetric(pull):
+        if not damping.count_nonzero():
+            squares = eigsh(pull, k=WANTED, which="LA", v0=start[:n], tol=ACCURACY, return_eigenvectors=False)
+            return _undamped(squares)
+        least = eigsh(pull, k=1, which="SA", v0=start[:n], tol=0.1, return_eigenvectors=False)
+        growth = math.sqrt(max(-float(least[0]), 0.0))
+    found: list[tuple[Any, Any]] = []
     for which in ("LM", "LI", "SR"):
         try:
-            values = eigs(matrix, WANTED, v0=start, return_eigenvectors=False, which=which, **ITERATION)
+            found.append(eigs(matrix, WANTED, v0=start, which=which, **ITERATION))
         except ArpackNoConvergence as error:  # where all motions are of one kind, another kind is not found
-            values = error.eigenvalues
-        found.append(values.astype(np.complex128))
-    extreme = np.concatenate(found)
-    if not len(extreme):
+            found.append((error.eigenvalues, error.eigenvectors))
+    values = np.concatenate([each for each, _ in found]).astype(complex)
+    if not len(values):
         raise InvalidInput("the highest frequency of this system could not be found: try a smaller part of it")
-    return extreme
+    vectors = np.concatenate([each for _, each in found], axis=1)
+    growth = max(growth, float(values.real.max()))
+    return _first_order(values, growth) if order == 1 else _damped(values, vectors[:n], damping, growth)
+
+
+def _is_symmetric(matrix: Any) -> bool:
+    other = matrix.T if matrix.ndim == 2 else matrix.swapaxes(-1, -2)
+    return bool(abs(matrix - other).max() <= ACCURACY * abs(matrix).max())
+
+
+def _undamped(squares: Array) -> Modes:
+    """From the eigenvalues of a symmetric stiffness."""
+    roots = np.sqrt(-squares.astype(complex))
+    twice = np.concatenate([squares, squares]).astype(complex)
+    return Modes(np.concatenate([roots, -roots]), twice, np.zeros_like(twice), float(roots.real.max(initial=0.0)))
+
+
+def _first_order(values: Complex, growth: float) -> Modes:
+    """x' = values x: what v of a drag does."""
+    return Modes(values, np.zeros_like(values), -values, growth)
+
+
+def _damped(values: Complex, x: Complex, damping: Any, growth: float) -> Modes:
+    """Modes of eigenvectors of which `x` are the upper halves, shape (..., n, k).
+
+    The oscillator with the mean damping of the motion has its eigenvalue: from (l^2 + l D + K) x = 0 follows
+    l^2 + l d + k = 0 with d = x* D x / x* x, and k like it.
+    """
+    weight = (np.abs(x) ** 2).sum(axis=-2)
+    moves = (weight > 0.0) & (np.abs(values) > 1e-12 * np.abs(values).max(initial=0.0))
+    drag = np.where(moves, (np.conj(x) * (damping @ x)).sum(axis=-2) / np.where(moves, weight, 1.0), 0.0)
+    drag = _rounded(drag, ACCURACY * np.abs(values))
+    pull = _rounded(np.where(moves, -values * (values + drag), 0.0), ACCURACY * np.abs(values) ** 2)
+    alone = (-drag - values).real > ACCURACY * np.abs(values)  # its partner grows, and hides what this one does
+    return Modes(values, np.where(alone, 0.0, pull), np.where(alone, -values, drag), growth)
+
+
+def _rounded(numbers: Complex, error: Array) -> Complex:
+    """Parts smaller than an error are none."""
+    real, imaginary = np.real(numbers), np.imag(numbers)
+    return np.asarray(
+        np.where(np.abs(real) > error, real, 0.0) + 1j * np.where(np.abs(imaginary) > error, imaginary, 0.0)
+    )

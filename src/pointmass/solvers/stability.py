@@ -1,6 +1,6 @@
 """How long a step may be before a solver amplifies what should not grow.
 
-Both functions run the solver itself on oscillators; no stability function is written down a second time.
+All functions run the solver itself on linear systems; no stability function is written down a second time.
 """
 
 from __future__ import annotations
@@ -13,12 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 from pointmass.solvers.base import Array, Memory, Solver
 from pointmass.solvers.control import control_of
 from pointmass.solvers.function_system import FunctionSystem
+from pointmass.solvers.splitting import Splitting
 
 MOST_MODES = 300
 SHORTEST, LONGEST, TRIALS = 2e-3, 1e4, 200  # steps to try, times the size of the eigenvalue
 STRICT, TOLERANCE = 1e-12, 1e-9  # growth per step that is round-off, for short steps and for others
 SHORT = 0.02
 HALVINGS = 40
+RUN, GROWTH, SHORTENED = 300, 10.0, 0.98  # a run that finds growth: steps of each half, factor; step after it
+
+Complex = NDArray[np.complex128]
 
 
 def amplification(solver: Solver | type[Solver], omega: ArrayLike, zeta: ArrayLike, h: ArrayLike) -> Any:
@@ -38,64 +42,87 @@ def amplification(solver: Solver | type[Solver], omega: ArrayLike, zeta: ArrayLi
     """
     solver = solver() if isinstance(solver, type) else solver
     omega, zeta, h = np.broadcast_arrays(*(np.asarray(each, np.float64) for each in (omega, zeta, h)))
-    radius = _amplification(solver, (omega * omega).ravel(), (2.0 * zeta * omega).ravel(), h.ravel())
-    return radius.reshape(h.shape)[()]
+    stiffness, damping = (omega * omega).astype(complex), (2.0 * zeta * omega).astype(complex)
+    return _amplification(solver, stiffness.ravel(), damping.ravel(), h.ravel()).reshape(h.shape)[()]
 
 
-def largest_safe_step(solver: Solver, *eigenvalues: ArrayLike) -> float:
-    """The largest h such that no step in (0, h] amplifies a mode that does not grow by itself.
+def largest_safe_step(solver: Solver, stiffness: ArrayLike, damping: ArrayLike) -> float:
+    """The largest h such that no step in (0, h] amplifies a mode x'' = -stiffness x - damping x'.
 
     Parameters
     ----------
     solver : with its arguments.
-    eigenvalues : of the Jacobian of dy/dt [1/s], complex, shape (k,), for each independent part of a system. Zeros and
-        growing modes are left out.
+    stiffness, damping : of each mode [1/s^2, 1/s], shape (k,). Complex where forces turn: x'' = -i g x' is a charge in
+        a magnetic field. Modes that stand still or grow by themselves are left out.
 
     Returns
     -------
     float
         h [s]; infinity if no step is too long, and for adaptive solvers, whose error control bounds the step itself;
         0 if every step is.
-
-    Notes
-    -----
-    For methods that treat x and v differently the limit of an overdamped mode depends on both of its eigenvalues.
-    Which real ones of a part belong together is not known, so its two largest are taken for a pair: a bound that is
-    never too large. A single real eigenvalue is a drag without a spring.
     """
-    if control_of(solver) is not None:
+    modes = np.stack(np.broadcast_arrays(np.atleast_1d(stiffness), np.atleast_1d(damping))).astype(complex)
+    if control_of(solver) is not None or not modes.size:
         return float("inf")
-    modes = {mode for part in eigenvalues for mode in _modes(np.asarray(part, np.complex128).ravel())}
-    if not modes:
-        return float("inf")
-    return float(_limits(solver, *_fastest(np.array(sorted(modes))).T).min())
+    return float(_limits(solver, *_fastest(modes)).min(initial=float("inf")))
 
 
-def _fastest(modes: Array) -> Array:
-    """Without weaker drags than the strongest, and no more modes than can be tried, shape (k, 2)."""
-    drag = modes[:, 0] == 0
-    modes = np.concatenate([modes[~drag], modes[drag][-1:]])
-    speed = np.sqrt(modes[:, 0]) + modes[:, 1]
-    kept: Array = modes[np.argsort(-speed, kind="stable")[:MOST_MODES]]
-    return kept
+def safe_step(solver: Solver, matrix: Any, h: float, growth: float) -> float:
+    """A step up to h with which a solver keeps all of dy/dt = matrix y in bounds.
+
+    Splitting methods take x and v apart, so modes of `matrix` are not modes of their step unless stiffness and damping
+    share them. A run finds what the modes did not tell.
+
+    Parameters
+    ----------
+    matrix : for y = [x, v], shape (2n, 2n), an array or sparse.
+    h : the limit of the modes, see `largest_safe_step` [s].
+    growth : largest real part of the eigenvalues [1/s]; what grows by itself may.
+    """
+    if not isinstance(solver, Splitting) or not 0.0 < h < float("inf"):
+        return h
+    n = matrix.shape[0] // 2
+    damped = abs(matrix[n:, n:]).max() > 0.0
+    system = FunctionSystem(lambda t, y: matrix @ y, 2 * n, order=2, velocity_dependent=bool(damped))
+    while damped and h > 0.0 and _runs_away(solver, system, h, growth):
+        h *= SHORTENED
+    return h
 
 
-def _modes(eigenvalues: NDArray[np.complex128]) -> list[tuple[float, float]]:
-    """Stiffness w^2 and damping 2 zeta w of the oscillators that have these eigenvalues."""
-    size = np.abs(eigenvalues)
-    kept = eigenvalues[(size > 1e-12 * size.max(initial=0.0)) & (eigenvalues.real <= TOLERANCE * size)]
-    real = np.abs(kept.imag) <= TOLERANCE * np.abs(kept)
-    modes = {(float(np.abs(e) ** 2), float(max(-2.0 * e.real, 0.0))) for e in kept[~real]}
-    decays = [*sorted(-kept[real].real), 0.0]
-    if real.any():
-        first, second = decays[-2], decays[-3] if len(decays) > 2 else 0.0
-        modes.add((float(first * second), float(first + second)))
-    return sorted(modes)
+def _runs_away(solver: Solver, system: FunctionSystem, h: float, growth: float) -> bool:
+    """Whether velocities of a run grow more than they do by themselves."""
+    y, sizes = np.cos(np.arange(system.dim)), []
+    memory = solver.start(system)
+    for _ in range(2):
+        for _ in range(RUN):
+            with np.errstate(all="ignore"):
+                step = solver.step(system, 0.0, y, h, memory)
+            y, memory = step.y1, step.memory
+        sizes.append(float(np.linalg.norm(y[system.dim // 2 :])))
+    allowed = GROWTH * float(np.exp(min(max(growth, 0.0) * h * RUN, 600.0)))
+    return not sizes[1] <= allowed * max(sizes[0], 1.0)
 
 
-def _limits(solver: Solver, stiffness: Array, damping: Array) -> Array:
-    """The steps at which the amplification of oscillators first exceeds 1, by trials and bisection, shape (k,)."""
-    scale = np.maximum(np.sqrt(stiffness), damping)
+def _fastest(modes: Complex) -> Complex:
+    """Modes that tell something, shape (2, k): no more than can be tried, and of plain drags the strongest."""
+    modes = np.unique(modes, axis=1)
+    stiffness, damping = modes
+    middle, gap = -0.5 * damping, np.sqrt(0.25 * damping * damping - stiffness)
+    speed = np.maximum(np.abs(middle + gap), np.abs(middle - gap))
+    grows = np.maximum((middle + gap).real, (middle - gap).real) > TOLERANCE * speed
+    kept = ~grows & (speed > 1e-12 * speed.max(initial=0.0))
+    drag = kept & (stiffness == 0.0) & (damping.imag == 0.0)
+    kept &= ~drag | (np.arange(len(drag)) == np.where(drag, speed, -1.0).argmax())
+    fastest = np.argsort(np.where(kept, -speed, 0.0), kind="stable")[: min(int(kept.sum()), MOST_MODES)]
+    result: Complex = modes[:, fastest]
+    return result
+
+
+def _limits(solver: Solver, stiffness: Complex, damping: Complex) -> Array:
+    """The steps at which the amplification of modes first exceeds 1, by trials and bisection, shape (k,)."""
+    if not len(stiffness):
+        return np.zeros(0)
+    scale = _scale(stiffness, damping)
     trials = np.geomspace(SHORTEST, LONGEST, TRIALS)[:, None] / scale
     lanes = _grows(solver, np.tile(stiffness, TRIALS), np.tile(damping, TRIALS), trials.ravel())
     growing = lanes.reshape(trials.shape)
@@ -108,62 +135,67 @@ def _limits(solver: Solver, stiffness: Array, damping: Array) -> Array:
     return np.where(growing.any(axis=0), np.where(first == 0, 0.0, low), np.inf)
 
 
-def _grows(solver: Solver, stiffness: Array, damping: Array, h: Array) -> NDArray[np.bool_]:
-    short = h * np.maximum(np.sqrt(stiffness), damping) < SHORT
-    allowed = 1.0 + np.where(short, STRICT, TOLERANCE)
-    result: NDArray[np.bool_] = ~(_amplification(solver, stiffness, damping, h) <= allowed)
-    return result
+def _scale(stiffness: Complex, damping: Complex) -> Array:
+    return np.asarray(np.maximum(np.sqrt(np.abs(stiffness)), np.abs(damping)))
 
 
-def _amplification(solver: Solver, stiffness: Array, damping: Array, h: Array) -> Array:
-    """Spectral radius of a step, for k oscillators with steps of their own at once, shape (k,)."""
+def _grows(solver: Solver, stiffness: Complex, damping: Complex, h: Array) -> NDArray[np.bool_]:
+    allowed = 1.0 + np.where(h * _scale(stiffness, damping) < SHORT, STRICT, TOLERANCE)
+    return np.asarray(~(_amplification(solver, stiffness, damping, h) <= allowed))
+
+
+def _amplification(solver: Solver, stiffness: Complex, damping: Complex, h: Array) -> Array:
+    """Spectral radius of a step, for k modes with steps of their own at once, shape (k,)."""
     k = len(h)
     system = _oscillators(stiffness, damping)
-    lengths = np.tile(h, 2)
+    lengths = np.tile(h, 4)
     history: tuple[str, ...] = getattr(solver, "history", ())
-    settled = solver.step(system, np.zeros(2 * k), np.zeros(2 * k), lengths, solver.start(system)).memory
+    settled = solver.step(system, np.zeros(4 * k), np.zeros(4 * k), lengths, solver.start(system)).memory
     size = 2 * (1 + len(history))
-    matrices = np.empty((k, size, size))
+    matrices = np.empty((k, size, size), complex)
     for column in range(size):
-        basis = np.zeros((size, k))
-        basis[column] = 1.0
-        parts = basis.reshape(1 + len(history), 2 * k)
+        basis = np.zeros((size, 2, k))  # real and imaginary parts
+        basis[column, 0] = 1.0
+        parts = basis.reshape(1 + len(history), 4 * k)
         memory: Memory = {**settled, **dict(zip(history, parts[1:], strict=True))}
         with np.errstate(all="ignore"):
-            step = solver.step(system, np.zeros(2 * k), parts[0], lengths, memory)
-        after = [step.y1, *(step.memory[name] for name in history)]
-        matrices[:, :, column] = np.concatenate(after).reshape(size, k).T
+            step = solver.step(system, np.zeros(4 * k), parts[0], lengths, memory)
+        after = np.concatenate([step.y1, *(step.memory[name] for name in history)]).reshape(size, 2, k)
+        matrices[:, :, column].real, matrices[:, :, column].imag = after[:, 0].T, after[:, 1].T
     return _radius(matrices)
 
 
-def _oscillators(stiffness: Array, damping: Array) -> FunctionSystem:
-    """x'' = -stiffness x - damping x' for each entry, every one an island."""
+def _oscillators(stiffness: Complex, damping: Complex) -> FunctionSystem:
+    """x'' = -stiffness x - damping x' for each entry, every one an island; x = [real parts, imaginary parts]."""
     from scipy import sparse
 
     k = len(stiffness)
-    jacobian = sparse.block_array(
-        [[None, sparse.eye_array(k)], [sparse.diags_array(-stiffness), sparse.diags_array(-damping)]], format="csr"
-    )
+
+    def times(factor: Complex) -> Any:
+        real, imaginary = sparse.diags_array(factor.real), sparse.diags_array(factor.imag)
+        return sparse.block_array([[real, -imaginary], [imaginary, real]])
+
+    jacobian = sparse.block_array([[None, sparse.eye_array(2 * k)], [-times(stiffness), -times(damping)]], format="csr")
     return FunctionSystem(
-        lambda t, y: np.concatenate([y[k:], -stiffness * y[:k] - damping * y[k:]]),
-        2 * k,
+        lambda t, y: jacobian @ y,
+        4 * k,
         order=2,
         jacobian=lambda t, y: jacobian,
         velocity_dependent=bool(damping.any()),
-        islands=np.tile(np.arange(k), 2),
+        islands=np.tile(np.arange(k), 4),
     )
 
 
-def _radius(matrices: Array) -> Array:
+def _radius(matrices: Complex) -> Array:
     """Largest absolute eigenvalue of each matrix, shape (k,).
 
     A pair from trace and determinant: an eigenvalue routine would lose half of the digits where both meet.
     """
     if matrices.shape[1] > 2:
-        widest: Array = np.abs(np.linalg.eigvals(matrices)).max(axis=1)
-        return widest
+        finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
+        widest = np.abs(np.linalg.eigvals(np.where(finite[:, None, None], matrices, 0.0))).max(axis=1)
+        return np.where(finite, widest, np.inf)
     (a, b), (c, d) = matrices.transpose(1, 2, 0)
-    middle, determinant = 0.5 * (a + d), a * d - b * c
-    gap = (0.5 * (a - d)) ** 2 + b * c
-    radius: Array = np.where(gap < 0.0, np.sqrt(np.abs(determinant)), np.abs(middle) + np.sqrt(np.maximum(gap, 0.0)))
-    return radius
+    with np.errstate(all="ignore"):
+        middle, gap = 0.5 * (a + d), np.sqrt((0.5 * (a - d)) ** 2 + b * c)
+        return np.asarray(np.maximum(np.abs(middle + gap), np.abs(middle - gap)))
