@@ -147,7 +147,7 @@ class Frame:
     positions : [m], shape (n, 3).
     velocities : [m/s], shape (n, 3).
     drawables : what there is to see. A drawable with the same `name` and `version` as in the frame before is the same.
-    quantities : diagnostics by name, such as "energy" [J]; shown in captions and stored.
+    quantities : diagnostics by name, such as "energy" [J], which captions show.
     """
 
     number: int

@@ -12,6 +12,7 @@ from render_scenes import FRONT, everything, frame, square
 from pointmass.errors import InvalidInput
 from pointmass.frame import Arrows, Camera, Curves, Points, Segments, Triangles
 from pointmass.render import Style, image
+from pointmass.render.caption import caption_words
 
 BLACK = Style(bottom=(0, 0, 0), top=(0, 0, 0), bloom=0.0, pool=0.0)
 SIZE = (160, 120)
@@ -270,11 +271,25 @@ def test_types_of_numbers_do_not_matter():
     assert np.mean(np.abs(one.astype(int) - other) > 2) < 0.02
 
 
-def test_caption_is_written_into_the_corner():
-    pictures = [image(everything(), size=(320, 240), style=Style(caption=caption)) for caption in (False, True)]
-    changed = (pictures[0] != pictures[1]).any(axis=2)
-    assert changed[200:, :160].any()
-    assert not changed[:200].any()
+@pytest.mark.parametrize("size", [(160, 40), (160, 90), (160, 700), (640, 360), (1280, 720), (7, 5)])
+def test_caption_fits_into_the_corner(size):
+    scene = frame(np.zeros((0, 3)), energy=-1.23456789e-300, kinetic=1.0, momentum_x=3.0)
+    plain, written = (image(scene, camera=FRONT, size=size, style=Style(caption=c)) for c in (False, True))
+    rows, columns = np.nonzero((plain != written).any(axis=2))
+    if min(size) >= 40:
+        assert len(rows)
+        assert columns.max() < size[0] - 1
+        assert rows.min() > 0.5 * size[1]
+    assert (image(scene, camera=FRONT, size=size, style=Style(caption=True)) == written).all()
+
+
+def test_caption_says_time_and_energy():
+    def words(**quantities):
+        return caption_words(frame(np.zeros((1, 3)), **quantities))
+
+    assert words() == "t = 0.500 s"
+    assert words(energy=4.5649, kinetic=1.0) == "t = 0.500 s   E = 4.565 J"
+    assert words(energy=float("nan")) == "t = 0.500 s"
 
 
 @pytest.mark.parametrize("size", [(0, 5), (5, -1), (1.5, 2), (9000, 10), (5,), (True, 4)])

@@ -40,7 +40,7 @@ SAMPLES = 48  # frames that an automatic camera looks at
 )
 @click.option("--frame", type=int, help="For a .png: the number of the frame, counted from 0; the last by default.")
 @click.option("--size", default="1280x720", show_default=True, help="Width and height [pixels].")
-@click.option("--caption", is_flag=True, help="Write time and quantities into the picture.")
+@click.option("--caption", is_flag=True, help="Write time and energy into the picture.")
 @click.option("--azimuth", type=float, help="Direction from which the camera looks [degrees].")
 @click.option("--elevation", type=float, help="Likewise, above the horizon [degrees].")
 @click.option("--fov", type=float, help="Vertical angle of view [degrees].")

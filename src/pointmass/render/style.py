@@ -25,7 +25,7 @@ class Style:
     pool : radius of the pool of light around the camera's target, in halves of the picture's height (0 = no end).
     bloom : how much of what is brighter than white spills around it (0 = none).
     shadows : whether solid things throw shadows.
-    caption : write the time and the frame's quantities into the lower left corner.
+    caption : write the time and the energy into the lower left corner.
 
     Raises
     ------
