@@ -65,7 +65,8 @@ def floats(value: Any) -> np.ndarray | None:
     """`value` as a new float64 array; None for text, complex numbers, and rows of different lengths."""
     try:
         array = np.asarray(value)
-        return np.array(array, np.float64) if array.dtype.kind in "biufO" else None
+        with np.errstate(over="ignore"):  # of long doubles
+            return np.array(array, np.float64) if array.dtype.kind in "biufO" else None
     except (TypeError, ValueError, OverflowError):
         return None
 

@@ -1,5 +1,6 @@
 """Grids from files, sound and broken."""
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -43,6 +44,29 @@ def write_vti(path, **arrays):
     return str(path)
 
 
+def write_classic(path):
+    xarray = pytest.importorskip("xarray")
+    arrays = {n: (("x", "y", "z"), VALUES[..., k]) for k, n in enumerate("uvw")}
+    xarray.Dataset({}, AXES).assign(arrays).to_netcdf(path, engine="scipy")
+    return str(path)
+
+
+def write_raw_vti(path):
+    """As ParaView writes: the numbers themselves after the XML."""
+    pytest.importorskip("pyvista")
+    from vtkmodules.vtkIOXML import vtkXMLImageDataReader, vtkXMLImageDataWriter
+
+    reader, writer = vtkXMLImageDataReader(), vtkXMLImageDataWriter()
+    reader.SetFileName(write_vti(path))
+    writer.SetInputConnection(reader.GetOutputPort())
+    writer.SetFileName(str(path.with_name("raw.vti")))
+    writer.SetDataModeToAppended()
+    writer.EncodeAppendedDataOff()
+    writer.SetCompressorTypeToNone()
+    writer.Write()
+    return str(path.with_name("raw.vti"))
+
+
 def same(grid, values=VALUES):
     np.testing.assert_array_equal(grid.values.reshape(values.shape), values)
     np.testing.assert_allclose(grid.origin, ORIGIN)
@@ -67,10 +91,7 @@ def test_netcdf_in_any_order(tmp_path, dims):
 
 
 def test_classic_netcdf(tmp_path):
-    xarray = pytest.importorskip("xarray")
-    arrays = {n: (("x", "y", "z"), VALUES[..., k]) for k, n in enumerate("uvw")}
-    xarray.Dataset(arrays, AXES).to_netcdf(tmp_path / "classic.nc", engine="scipy")
-    same(load_grid(tmp_path / "classic.nc"))
+    same(load_grid(write_classic(tmp_path / "classic.nc")))
 
 
 def test_netcdf_with_time_falling_axes_and_other_names(tmp_path):
@@ -133,13 +154,22 @@ def test_nan_names_its_cell(tmp_path):
         load_grid(write_npz(tmp_path / "bad.npz", values=bad, origin=ORIGIN, spacing=SPACING))
 
 
-@pytest.mark.parametrize("writer", [write_npz, write_netcdf, write_vti])
-@pytest.mark.parametrize("part", [0.0, 0.3, 0.9])
-def test_cut_off_or_another_kind_of_file(tmp_path, writer, part, capfd):
-    suffix = {write_npz: ".npz", write_netcdf: ".nc", write_vti: ".vti"}[writer]
-    arguments = {"values": VALUES, "origin": ORIGIN, "spacing": SPACING} if writer is write_npz else {}
-    whole = writer(tmp_path / f"whole{suffix}", **arguments)
-    data = Path(whole).read_bytes()
+WRITERS = {
+    "npz": lambda path: write_npz(path, values=VALUES, origin=ORIGIN, spacing=SPACING),
+    "nc": write_netcdf,
+    "classic.nc": write_classic,
+    "vti": write_vti,
+    "raw.vti": write_raw_vti,
+}
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+@pytest.mark.parametrize("part", [0.0, 0.3, 0.9, 0.98])
+def test_cut_off_or_another_kind_of_file(tmp_path, kind, part):
+    suffix = f".{kind.split('.')[-1]}"
+    whole = Path(WRITERS[kind](tmp_path / f"whole{suffix}"))
+    same(load_grid(whole))
+    data = whole.read_bytes()
     broken = tmp_path / f"broken{suffix}"
     broken.write_bytes(data[: int(part * len(data))])
     with pytest.raises(InvalidInput) as error:
@@ -149,6 +179,29 @@ def test_cut_off_or_another_kind_of_file(tmp_path, writer, part, capfd):
     broken.write_text("this is not a grid")
     with pytest.raises(InvalidInput):
         load_grid(broken)
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_libraries_say_nothing_on_stderr(tmp_path, kind):
+    """They write to the file of the process, or make loggers, so a test in this process would miss it."""
+    suffix = f".{kind.split('.')[-1]}"
+    data = Path(WRITERS[kind](tmp_path / f"whole{suffix}")).read_bytes()
+    (tmp_path / f"cut{suffix}").write_bytes(data[: len(data) // 2])
+    (tmp_path / f"text{suffix}").write_text("this is not a grid")
+    (tmp_path / f"empty{suffix}").write_bytes(b"")
+    code = """if True:
+        import sys, pointmass as pm
+        for path in sys.argv[1:]:
+            try:
+                pm.load_grid(path)
+            except pm.InvalidInput as error:
+                print(error, file=sys.stderr)
+    """
+    paths = [str(tmp_path / f"{name}{suffix}") for name in ("cut", "text", "empty")]
+    done = subprocess.run([sys.executable, "-c", code, *paths], capture_output=True, text=True, check=True)
+    lines = done.stderr.splitlines()
+    assert len(lines) == 3, done.stderr
+    assert all(line.startswith(f"grid file {path!r}") for line, path in zip(lines, paths, strict=True))
 
 
 @pytest.mark.parametrize(
@@ -162,6 +215,13 @@ def test_cut_off_or_another_kind_of_file(tmp_path, writer, part, capfd):
         ),
         ({"values": VALUES, "origin": ORIGIN, "spacing": 0.0}, "above 0"),
         ({"values": np.array([{}]), "origin": ORIGIN, "spacing": 1.0}, "damaged"),
+        ({"values": VALUES + 1j, "origin": ORIGIN, "spacing": 1.0}, "must be real numbers"),
+        ({"values": VALUES.astype(str), "origin": ORIGIN, "spacing": 1.0}, "must be real numbers"),
+        ({"values": VALUES.astype("M8[s]"), "origin": ORIGIN, "spacing": 1.0}, "must be real numbers"),
+        ({"u": VALUES[..., 0] + 1j, "v": VALUES[..., 0], "origin": ORIGIN, "spacing": 1.0}, "must be real numbers"),
+        ({"values": VALUES, "origin": np.array([1j, 0, 0]), "spacing": 1.0}, "origin of the grid must be numbers"),
+        ({"values": VALUES, "origin": ORIGIN, "spacing": np.array(1j)}, "spacing of the grid must be numbers"),
+        ({"values": VALUES[None], "origin": ORIGIN, "spacing": 1.0, "times": ["0"]}, "times of the grid must be"),
     ],
 )
 def test_npz_that_does_not_fit(tmp_path, arrays, hint):

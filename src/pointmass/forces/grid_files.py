@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -12,7 +12,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.errors import InvalidInput
+from pointmass.errors import InvalidInput, floats
 from pointmass.laws.grid import Grid, Outside
 
 Array = NDArray[np.float64]
@@ -86,17 +86,18 @@ def _read_npz(file: Path, names: list[str] | None) -> Contents:
     for name in ("origin", "spacing"):
         if name not in arrays:
             raise InvalidInput(f"it has no array {name!r}; it has {', '.join(arrays) or 'none'}")
-    if names is None and "values" in arrays:
-        values = arrays["values"]
-    else:
-        values = _together([_pick(arrays, name) for name in _chosen(names, arrays)])
+    chosen = ["values"] if names is None and "values" in arrays else _chosen(names, arrays)
+    values = _together([_pick(arrays, name) for name in chosen])
     return values, arrays["origin"], arrays["spacing"], arrays.get("times")
 
 
 def _read_netcdf(file: Path, names: list[str] | None) -> Contents:
     import xarray
 
-    with xarray.open_dataset(file, decode_times=False) as data:
+    with file.open("rb") as opened:
+        classic = opened.read(4) in (b"CDF\x01", b"CDF\x02")  # libnetcdf reads zeros where such a file is cut off
+    options: dict[str, Any] = {"engine": "scipy", "mmap": False} if classic else {}
+    with xarray.open_dataset(file, decode_times=False, **options) as data:
         variables = {str(name): variable for name, variable in data.data_vars.items()}
         parts = [_ordered(_pick(variables, name)) for name in _chosen(names, variables)]
         coordinates = {axis: np.asarray(data[axis].values, np.float64) for axis in AXES if axis in data.coords}
@@ -114,12 +115,14 @@ def _read_netcdf(file: Path, names: list[str] | None) -> Contents:
 
 def _read_vti(file: Path, names: list[str] | None) -> Contents:
     import pyvista
+    from vtkmodules.vtkIOXML import vtkXMLImageDataReader
 
-    with warnings.catch_warnings(record=True) as caught:  # VTK reads what it can and only warns
-        warnings.simplefilter("always")
-        mesh = pyvista.read(file)
-    broken = any("raised an error" in str(warning.message) for warning in caught)
-    if broken or not isinstance(mesh, pyvista.ImageData) or mesh.n_points == 0:
+    reader = vtkXMLImageDataReader()
+    reader.SetFileName(str(file))
+    with _vtk_silenced() as complaints:
+        reader.Update()
+    mesh = pyvista.wrap(reader.GetOutput())
+    if _cut_off(file) or "ERROR" in complaints.GetOutput() or mesh.n_points == 0:
         raise InvalidInput("it is damaged, or holds no image data")
     if not np.allclose(mesh.direction_matrix, np.eye(3)):
         raise InvalidInput("its axes are turned: resample it to axes along x, y and z")
@@ -132,6 +135,29 @@ def _read_vti(file: Path, names: list[str] | None) -> Contents:
     values = _together([part.reshape(*shape, *part.shape[1:], order="F") for part in parts])
     spacing = [step if count > 1 else 1.0 for step, count in zip(mesh.spacing, shape, strict=True)]
     return values, mesh.origin, spacing, None
+
+
+@contextmanager
+def _vtk_silenced() -> Iterator[Any]:
+    """Keep what VTK says about a file, which it reads as far as it can, in a window of text instead of on stderr."""
+    from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
+
+    complaints, window = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
+    verbosity = vtkLogger.GetCurrentVerbosityCutoff()
+    vtkOutputWindow.SetInstance(complaints)
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    try:
+        yield complaints
+    finally:
+        vtkLogger.SetStderrVerbosity(verbosity)
+        vtkOutputWindow.SetInstance(window)
+
+
+def _cut_off(file: Path) -> bool:
+    """Whether a VTK file has no end: of raw data that are cut off, VTK reads what is there and makes up the rest."""
+    with file.open("rb") as opened:
+        opened.seek(max(0, file.stat().st_size - 1000))
+        return not opened.read().rstrip().endswith(b"</VTKFile>")
 
 
 READERS: dict[str, Callable[[Path, list[str] | None], Contents]] = {
@@ -165,7 +191,9 @@ def _pick(variables: dict[str, Any], name: str) -> Any:
 
 def _together(parts: list[Any]) -> Array:
     """Components as the last axis; one vector stays as it is, and a missing third component is 0."""
-    arrays = [np.asarray(part, np.float64) for part in parts]
+    arrays = [array for part in parts if (array := floats(part)) is not None]
+    if len(arrays) < len(parts):
+        raise InvalidInput("its values must be real numbers, not text or complex numbers")
     if len(arrays) == 1:
         return arrays[0]
     if len({a.shape for a in arrays}) > 1:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pointmass.description import Described
-from pointmass.errors import InvalidInput, finite_array
+from pointmass.errors import InvalidInput, finite_array, floats
 from pointmass.laws.program import Primitive
 
 Outside = Literal["zero", "clamp", "wrap"]
@@ -59,7 +59,8 @@ class Grid(Described):
         variables: Sequence[str] | None = None,
     ) -> None:
         self.origin = finite_array("origin of the grid", origin, (3,))
-        self.spacing = finite_array("spacing of the grid", [spacing] * 3 if np.ndim(spacing) == 0 else spacing, (3,))
+        one = isinstance(spacing, (int, float, np.ndarray)) and np.ndim(spacing) == 0
+        self.spacing = finite_array("spacing of the grid", [spacing] * 3 if one else spacing, (3,))
         if (self.spacing <= 0).any():
             raise InvalidInput(f"spacing of the grid = {spacing} is not allowed: it must be above 0 [m] on every axis")
         if outside not in get_args(Outside):
@@ -190,10 +191,9 @@ def _times(times: ArrayLike | None) -> NDArray[np.float64]:
 
 def _cells(values: ArrayLike, times: NDArray[np.float64]) -> NDArray[np.float64]:
     """The values with a time axis."""
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidInput("values of the grid must be numbers, all rows of one length") from None
+    array = floats(values)
+    if array is None:
+        raise InvalidInput("values of the grid must be real numbers, all rows of one length")
     if array.ndim == 4:
         array = array[None]
     if array.ndim != 5 or array.shape[4] not in (1, 3) or array.size == 0:
