@@ -5,6 +5,7 @@ import pytest
 
 import pointmass as pm
 from pointmass.frame import Frame
+from pointmass.solvers import SOLVERS
 
 
 def fountain(solver=None, dt=1 / 60, rate=100.0, lifetime=0.4, colliders=(), seed=0, **keywords):
@@ -218,8 +219,6 @@ def test_fast_particles_have_not_diverged():
 @pytest.mark.parametrize("name", ["bdf2", "dopri5"])
 def test_memory_follows_particles_over_births_and_deaths(name):
     # A particle that nothing links to others moves as if it were alone.
-    from pointmass.solvers import SOLVERS
-
     def run(emitters):
         p = pm.Particles([[0.2, 1, 0]], [[0, 0, 1]])
         system = pm.ParticleSystem(p, [pm.Gravity(), pm.Harmonic(k_s=30.0)], [pm.Plane()])
@@ -245,6 +244,40 @@ def test_memory_follows_links_that_are_switched():
     assert sim.t == 9 / 60
 
 
+@pytest.mark.parametrize("name", sorted(SOLVERS))
+@pytest.mark.parametrize("change", ["v", "x", "pin"])
+def test_a_hand_between_two_steps_is_a_new_start(name, change):
+    """As bits, what was touched moves like a run that begins there; what was not touched does not notice."""
+
+    def system(x, v):
+        p = pm.Particles(x, v)
+        return pm.ParticleSystem(p, [pm.Springs([(0, 1)], k_s=10.0, k_d=0.1, rest=0.5), pm.Drag(0.2), pm.Gravity()])
+
+    def touch(p):
+        if change == "pin":
+            p.pin([1])
+        else:
+            getattr(p, change)[1] += [0.3, 0.1, -0.2]
+
+    touched, untouched = (system([[0, 0, 0], [1, 0, 0], [5, 0, 0]], [[0, 0, 0], [0, 1, 0], [1, 2, 3]]) for _ in "ab")
+    run, still = (pm.Simulation(each, SOLVERS[name](), 1 / 64) for each in (touched, untouched))
+    for sim in (run, still):
+        sim.step(4)
+    touch(touched.particles)
+    pinned_at = touched.particles.x[1].copy()
+    new = system(touched.particles.x.copy(), touched.particles.v.copy())
+    new.set_state(new.get_state(), run.t)
+    if change == "pin":
+        new.particles.pin([1])
+    begun = pm.Simulation(new, SOLVERS[name](), 1 / 64)
+    for sim in (run, still, begun):
+        sim.step(4)
+    np.testing.assert_array_equal(touched.particles.x[:2], new.particles.x[:2])
+    np.testing.assert_array_equal(touched.particles.x[2], untouched.particles.x[2])
+    if change == "pin":
+        np.testing.assert_array_equal(touched.particles.x[1], pinned_at)
+
+
 def test_run_comes_so_many_seconds_further() -> None:
     sim = pm.Simulation(pm.ParticleSystem(pm.Particles([[0, 0, 0]]), pm.Gravity()), "leapfrog", dt=1 / 240)
     sim.run(1.0)
@@ -261,3 +294,20 @@ def test_a_solver_may_be_named() -> None:
     assert pm.Simulation(system, "backward-euler").solver.name == "implicit_euler"
     with pytest.raises(pm.InvalidInput, match=r"RK4\(\), with brackets"):
         pm.Simulation(system, pm.RK4)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["bdf2", "dopri5"])
+def test_a_run_that_diverged_can_go_on_when_its_cause_is_gone(name):
+    """Also if particles were born in the step that failed."""
+    p = pm.Particles([[0, 0, 0]])
+    blast = pm.Field(("exp(900*t)*1e300", "0", "0"), enabled=False)
+    nozzle = pm.Nozzle(rate=70, lifetime=0.2, position=(0, 3, 0))
+    sim = pm.Simulation(pm.ParticleSystem(p, [pm.Gravity(), blast]), name, 1 / 60, emitters=[nozzle])
+    sim.step(60)
+    blast.enabled = True
+    with pytest.raises(pm.Diverged):
+        sim.step()
+    blast.enabled = False
+    sim.step(60)
+    assert sim.t == 2.0
+    assert p.x[0, 1] == pytest.approx(-9.81 * 4 / 2, rel=1e-2)

@@ -175,13 +175,12 @@ class Simulation:
         old = len(self.system.particles)
         born = [e.births(t0, t1, self.seed, f"{type(e).__name__} {k}") for k, e in enumerate(self.emitters)]
         clock = self._bear(born, t0)
-        before, memory = self.system.get_state(), self.engine.memory
+        before = self.system.get_state()
         try:
             self.engine.step(t0, t1, clock)
             self._check_speed()
         except Diverged as error:
             self.system.set_state(before, t0)
-            self.engine.memory = memory
             explained = self._explained(error)
             self.system.remove(np.arange(old, len(self.system.particles)))
             raise explained from error

@@ -18,6 +18,7 @@ from pointmass.collisions.contact import Contacts
 from pointmass.collisions.discrete import bounce
 from pointmass.collisions.response import respond
 from pointmass.collisions.swept import Paths, first_hit
+from pointmass.errors import Diverged
 from pointmass.particles import Array
 from pointmass.solvers.advance import Stats, advance
 from pointmass.solvers.base import Memory, Solver, Step
@@ -68,6 +69,7 @@ class ReferenceEngine:
         self._pieces: list[Piece] = []
         self._ids = self.system.particles.id
         self._islands = self.system.island_of_particle
+        self._left = self._touchable()
 
     def step(self, t0: float, t1: float, births: Array | None = None) -> None:
         """Take the system from t0 to t1.
@@ -97,10 +99,14 @@ class ReferenceEngine:
             y, self.memory, stats = advance(
                 system, self.solver, t0, t1, system.get_state(), self.memory, clock=clock, **hooks
             )
+        except Diverged:
+            self.memory = {}
+            raise
         finally:
             system.filter = None
         self.stats = self.stats + stats
         system.set_state(y, t1)
+        self._left = self._touchable()
 
     def state_at(self, t: float) -> Array:
         """State of the present particles at a time within the last step, shape (dim,); nothing is changed.
@@ -130,13 +136,27 @@ class ReferenceEngine:
         path = Paths(x0, v0, x1, v1, piece.t[one], piece.h[one], np.zeros(len(x0)))
         return np.concatenate([path.position(theta[one]).ravel(), path.velocity(theta[one]).ravel()])
 
+    def _touchable(self) -> Array:
+        """What a hand may change of each particle between two steps: state and pin, shape (order + 1, n, 3)."""
+        p = self.system.particles
+        pins = np.broadcast_to(p.pinned[:, None], p.x.shape)
+        return np.concatenate([_by_particle(self.system.get_state(), self.system.order), pins[None]])
+
     def _fit_memory(self) -> None:
-        """Carry what the solver remembers over births, deaths and new links: each particle keeps its own."""
+        """Carry what the solver remembers over births, deaths and new links: each particle keeps its own.
+
+        An island in which somebody was moved, pushed or pinned from outside starts anew.
+        """
         system = self.system
         ids, islands = system.particles.id, system.island_of_particle
-        if not self.memory or (self._ids is ids and self._islands is islands):
+        now_is = self._touchable()
+        same = self._ids is ids and self._islands is islands
+        if not self.memory or (same and np.array_equal(now_is, self._left)):
             return
         then, now = _match(self._ids, ids)
+        touched = islands[now[(now_is[:, now] != self._left[:, then]).any(axis=(0, 2))]]
+        kept = ~np.isin(islands[now], touched)
+        then, now = then[kept], now[kept]
         fresh = self.solver.start(system)
         for name, new in fresh.items():
             old = self.memory[name]
