@@ -213,6 +213,20 @@ def test_fast_particles_have_not_diverged():
     assert p.x[0, 0] == pytest.approx(1e6)
 
 
+@pytest.mark.parametrize("solver", ["leapfrog", "implicit_euler", "dopri5"])
+def test_what_grows_by_itself_has_not_diverged(solver):
+    p = pm.Particles([[0, 0, 0]])
+    sim = pm.Simulation(pm.ParticleSystem(p, [pm.Field(("1e5*t", "0", "0"))]), solver, dt=0.1)
+    sim.step(1000)
+    assert p.v[0, 0] == pytest.approx(1e5 * 100**2 / 2, rel=2e-3)
+
+
+def test_a_flow_that_carries_away_has_not_diverged():
+    p = pm.Particles([[1e-6, 0, 0]])
+    pm.Simulation(pm.ParticleSystem(p, [pm.Flow(("x", "0", "0"))]), dt=0.01).step(6000)
+    assert p.x[0, 0] == pytest.approx(1e-6 * np.exp(60), rel=1e-6)
+
+
 # ---------------------------------------------------------------------------------------------------- memory
 
 
