@@ -10,10 +10,14 @@ from click.testing import CliRunner
 from pointmass.cli import main
 
 POINTS = '[[bodies]]\ntype = "points"\nx = [[0.0, 1.0, 0.0]]\n'
+FORCE = POINTS + "[[forces]]\ntype = "
 BAD = {
     "an attribute of the name of a column": (POINTS + "attributes = {x = 1.0}\n", "particle attribute 'x'"),
     "a pin counted from the end": (POINTS + "pinned = [-1]\n", "counted from 0, not [-1]"),
     "a pin of nobody": (POINTS + "pinned = 1\n", "rows of particles"),
+    "a formula that is nan": (FORCE + '"field"\nforce = ["log(-1)", "0", "0"]', "forces.0 (field): force 'log(-1)'"),
+    "a parameter that is infinite": (FORCE + '"drag"\nk = "9**9**9**9"', "9**9**9 = inf"),
+    "a constant that divides by zero": (FORCE + '"field"\npotential = "k*x"\nconstants = {k = "t/0"}', "by zero"),
 }
 
 

@@ -7,8 +7,9 @@ import pytest
 
 from pointmass.errors import InvalidInput
 from pointmass.laws import functions as fn
-from pointmass.laws.columns import source
+from pointmass.laws.columns import columns, source
 from pointmass.laws.derivative import RULES, gradient
+from pointmass.laws.program import Program, Symbol
 from pointmass.laws.trace import trace
 
 A = np.array([-2.3, -1.0, -0.4, 0.0, 0.3, 1.0, 1.7, 2.9])
@@ -116,8 +117,13 @@ def test_folding_never_raises():
             fn.sin(big * 1e5),
         )
 
-    result = law(extreme).columns(A, B)
+    program = Program()
+    symbols = [Symbol(program, program.argument(name)) for name in "ab"]
+    program.outputs = [result.node for result in extreme(*symbols)]
+    result = columns(program, "ab")(A, B)
     np.testing.assert_array_equal(result, [np.nan, np.inf, np.inf, np.inf, -np.inf, np.nan])
+    with pytest.raises(InvalidInput, match="it computes with nan"):
+        law(extreme)
 
 
 def test_conditions_are_numbers_and_numbers_are_conditions():

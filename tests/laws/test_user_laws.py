@@ -126,6 +126,13 @@ def with_if(x, v, m, t):
         (law_of(with_if), "use pm.where"),
         (law_of(lambda x, v, m, t: (x[0], x[1])), "must return 3 numbers, but returned 2"),
         (law_of(lambda x, v, m, t: None), "returned nothing"),
+        (law_of(lambda x, v, m, t: (float("nan"), 0, 0)), "computes with nan"),
+        (law_of(lambda x, v, m, t: (fn.sqrt(-1.0), 0, 0)), "computes with nan"),
+        (law_of(lambda x, v, m, t: (x[0] * np.nan, 0, 0)), "computes with nan"),
+        (law_of(lambda x, v, m, t: (np.inf, 0, 0)), "returns inf"),
+        (law_of(lambda x, v, m, t: (x[0] / 0, 0, 0)), "divides by zero"),
+        (law_of(lambda x, v, m, t: (x[0] % 0, 0, 0)), "divides by zero"),
+        (spring_of(lambda x1, v1, x2, v2, t: (float("nan"), 0, 0)), "computes with nan"),
         (law_of(lambda x, v, t, k=1.0: (k, 0, 0)), "must take (x, v, m, t)"),
         (law_of(lambda x, v, m: (m, 0, 0)), "must take (x, v, m, t)"),
         (law_of(lambda *everything: (1, 0, 0)), "must take (x, v, m, t)"),
@@ -298,7 +305,7 @@ def test_births_leave_selections_and_springs_alone():
 
 
 def test_removal_then_birth():
-    system = ParticleSystem(particles(), [Drag(k=1.0, on=[-1]), Springs([(0, 1)])])
+    system = ParticleSystem(particles(), [Drag(k=1.0, on=[3]), Springs([(0, 1)])])
     system.remove([0])
     system.add(X[:1], V[:1])
     assert system.forces[0].on.tolist() == [False, False, True, False]

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pointmass.errors import InvalidInput, unknown
+import numpy as np
+
+from pointmass.errors import InvalidInput, number, shown, unknown
 from pointmass.laws.formula import CONSTANTS, FUNCTIONS, Formula
 from pointmass.laws.grid import Grid
 from pointmass.laws.parameter import Parameter, Scalar
@@ -105,8 +107,13 @@ def _parsed(what: str, formulas: Any, count: int) -> tuple[Formula, ...]:
     if not isinstance(parts, (list, tuple)) or len(parts) not in ({1} if count == 1 else {2, 3}):
         wanted = "one formula" if count == 1 else 'three formulas, such as ("-y", "x", "0")'
         raise InvalidInput(f"{what} must be {wanted}, not {formulas!r}")
-    parts = [*parts, "0"][: max(count, 1)]
-    for part in parts:
-        if not isinstance(part, (str, int, float)) or isinstance(part, bool):
-            raise InvalidInput(f"{what} must be made of formulas and numbers, not {part!r}")
-    return tuple(Formula(str(part), what=what) for part in parts)
+    return tuple(Formula(_text(what, part), what=what) for part in [*parts, "0"][: max(count, 1)])
+
+
+def _text(what: str, part: Any) -> str:
+    """A formula, or a number as one."""
+    if isinstance(part, str):
+        return part
+    if not isinstance(part, (int, float, np.number)) or isinstance(part, bool):
+        raise InvalidInput(f"{what} must be made of formulas and numbers, not {shown(part)}")
+    return repr(number(what, part))

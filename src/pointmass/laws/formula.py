@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import math
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -65,7 +65,7 @@ class Formula:
     Raises
     ------
     InvalidInput
-        Not a formula, or a name or function that is not known; the known ones are listed.
+        Not a formula, a name or function that is not known, a part without names that is not finite: log(-1).
     """
 
     def __init__(self, text: str, names: Iterable[str] | None = None, what: str = "formula") -> None:
@@ -80,7 +80,8 @@ class Formula:
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise InvalidInput(f"{what} {self.shown!r} is not a formula; write it like -k*x + sin(t)") from None
         self.names: set[str] = set()
-        self._check(self._tree, 0)
+        with np.errstate(all="ignore"):
+            self._check(self._tree, 0)
         if names is not None:
             self.restrict(names)
 
@@ -95,13 +96,23 @@ class Formula:
         with np.errstate(all="ignore"):
             return self._value(self._tree, values)
 
-    def _check(self, node: ast.expr, depth: int) -> None:
+    def _check(self, node: ast.expr, depth: int) -> Any:
+        """The value of a part without names, or None."""
         if depth > DEEPEST:
             raise InvalidInput(f"{self.what} nests more than {DEEPEST} operations: split it into several formulas")
+        values = [self._check(part, depth + 1) for part in self._parts(node)]
         if isinstance(node, ast.Name) and node.id not in CONSTANTS:
             self.names.add(node.id)
-        for part in self._parts(node):
-            self._check(part, depth + 1)
+            return None
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div | ast.Mod) and values[1] == 0:
+            raise self._zero()
+        if any(value is None for value in values):
+            return None
+        value = self._apply(node, values)
+        if not math.isfinite(value):
+            part = ast.get_source_segment(self.text, node)
+            raise InvalidInput(f"{self.what} {self.shown!r} has a part that is not finite: {part} = {value}")
+        return value
 
     def _parts(self, node: ast.expr) -> list[ast.expr]:
         """The operands of what a formula may contain; everything else is refused here."""
@@ -139,29 +150,35 @@ class Formula:
             raise InvalidInput(f"{self.what} {self.shown!r} has a number above 1e308")
 
     def _value(self, node: ast.expr, values: Mapping[str, Any]) -> Any:
-        match node:
-            case ast.Constant(value=number):
-                return float(number)  # type: ignore[arg-type]
-            case ast.Name(id=name):
-                return CONSTANTS[name] if name in CONSTANTS else values[name]
-            case ast.UnaryOp(op=op, operand=inner):
-                return -self._value(inner, values) if isinstance(op, ast.USub) else self._value(inner, values)
-            case ast.BinOp(left=a, op=op, right=b):
-                return self._arithmetic(op, self._value(a, values), self._value(b, values))
-            case ast.Compare(left=a, ops=[op], comparators=[b]):
-                holds = COMPARE[type(op)](self._value(a, values), self._value(b, values))
-                return holds if isinstance(holds, Symbol) else fn.where(holds, 1.0, 0.0)
-            case ast.IfExp(test=c, body=a, orelse=b):
-                return fn.where(*(self._value(part, values) for part in (c, a, b)))
-            case ast.Call(func=ast.Name(id=name), args=arguments):
-                return FUNCTIONS[name][0](*(self._value(part, values) for part in arguments))
+        if isinstance(node, ast.Name) and node.id not in CONSTANTS:
+            return values[node.id]
+        return self._apply(node, [self._value(part, values) for part in self._parts(node)])
+
+    def _apply(self, node: ast.expr, parts: Sequence[Any]) -> Any:
+        """What a node makes of the values of its parts."""
+        try:
+            match node:
+                case ast.Constant(value=number):
+                    return float(number)  # type: ignore[arg-type]
+                case ast.Name(id=name):
+                    return CONSTANTS[name]
+                case ast.UnaryOp(op=op):
+                    return -parts[0] if isinstance(op, ast.USub) else parts[0]
+                case ast.BinOp(op=op):
+                    return BINARY[type(op)](*parts)
+                case ast.Compare(ops=[compared]):
+                    holds = COMPARE[type(compared)](*parts)
+                    return holds if isinstance(holds, Symbol) else fn.where(holds, 1.0, 0.0)
+                case ast.IfExp():
+                    return fn.where(*parts)
+                case ast.Call(func=ast.Name(id=name)):
+                    return FUNCTIONS[name][0](*parts)
+        except (ZeroDivisionError, OverflowError):
+            raise self._zero() from None
         raise AssertionError(node)
 
-    def _arithmetic(self, op: ast.operator, a: Any, b: Any) -> Any:
-        try:
-            return BINARY[type(op)](a, b)
-        except (ZeroDivisionError, OverflowError):
-            raise InvalidInput(f"{self.what} {self.shown!r} divides by zero or overflows") from None
+    def _zero(self) -> InvalidInput:
+        return InvalidInput(f"{self.what} {self.shown!r} divides by zero or overflows")
 
 
 def _description(node: ast.expr) -> str:

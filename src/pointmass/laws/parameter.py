@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.errors import InvalidInput, finite_array, number
+from pointmass.errors import InvalidInput, finite_array, floats, number
 from pointmass.laws.formula import Formula
 from pointmass.laws.program import flatten
 from pointmass.laws.trace import Traced, trace
@@ -32,8 +32,9 @@ class Component:
             self.needs = tuple(sorted(formula.names - {"t"}))
             names = ("t", *self.needs)
             arguments = dict.fromkeys(names, "scalar")
-            self.value = trace(lambda *v: formula(dict(zip(names, v, strict=True))), arguments, 1, name)
-            if not formula.names:
+            if formula.names:
+                self.value = trace(lambda *v: formula(dict(zip(names, v, strict=True))), arguments, 1, name)
+            else:
                 self.value = number(name, formula({}), unit=unit, **bounds)
         elif callable(value):
             self.value = trace(value, {"t": "scalar"}, 1, name)
@@ -155,7 +156,5 @@ class Parameter:
 
 def _ndim(value: Any) -> int:
     """Dimensions of an array of numbers; 0 for anything else."""
-    try:
-        return np.ndim(np.asarray(value, dtype=float))
-    except (TypeError, ValueError):
-        return 0
+    array = floats(value)
+    return 0 if array is None else array.ndim

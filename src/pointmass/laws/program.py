@@ -104,6 +104,24 @@ class Program:
         """Names of the inputs that the outputs depend on."""
         return {self.nodes[i][1] for i in self.live() if self.nodes[i][0] == "arg"}
 
+    def check(self) -> None:
+        """Refuse what has no value whatever the inputs are.
+
+        Raises
+        ------
+        InvalidInput
+            NaN among its numbers, a division by the number 0, or a result that is always infinite.
+        """
+        for i in self.live():
+            op, *rest = self.nodes[i]
+            if op == "const" and math.isnan(rest[0]):
+                raise InvalidInput("it computes with nan: use finite numbers")
+            if op == "div" and self.value(rest[1]) == 0:
+                raise InvalidInput("it divides by zero")
+        for i in self.outputs:
+            if self.value(i) in (math.inf, -math.inf):
+                raise InvalidInput(f"it returns {self.value(i)}: use finite numbers")
+
     def value(self, node: int) -> float | None:
         """The number that a node is, or None where it is computed."""
         op, *rest = self.nodes[node]
@@ -231,6 +249,8 @@ class Symbol:
         return self._flipped("div", other)
 
     def __mod__(self, other: Any) -> Symbol:
+        if self.program.value(self.lift(other)) == 0:
+            raise InvalidInput("it divides by zero")
         return self.apply("sub", self.__floordiv__(other).apply("mul", other))
 
     def __rmod__(self, other: Any) -> Symbol:

@@ -99,4 +99,8 @@ def trace(
         program.outputs = [program.number(anchor.lift(n)) for n in numbers]
     except InvalidInput as error:
         raise InvalidInput(f"law {name!r} must return numbers: {error}") from error
+    try:
+        program.check()
+    except InvalidInput as error:
+        raise InvalidInput(f"law {name!r}: {error}") from error
     return Traced(name, tuple(inputs), program)
