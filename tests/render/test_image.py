@@ -345,3 +345,10 @@ def test_a_glow_lights_nothing_beyond_its_reach(kind, x):
     assert len(rows) > 20
     assert columns.min() >= 256 + scale * (x - 0.35) - 1
     assert columns.max() <= 256 + scale * (x + 0.2 + 0.35) + 1
+
+
+def test_an_edit_of_a_helper_is_a_new_kernel():
+    from pointmass.render import inner, kernels, kernels_post, kernels_shadow
+
+    for compiled in (kernels.draw, kernels.sort_into_tiles, kernels_post.develop, kernels_shadow.cast):
+        assert inner.DIGEST in compiled.py_func.__qualname__

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pointmass.cli.compiling import compiling_said
 from pointmass.cli.main import Interrupted
 from pointmass.cli.options import (
     RunOptions,
@@ -132,7 +133,7 @@ class Drawing:
         frames: Iterator[Frame] = iter([cache[last]]) if self.single else iter(cache)
         total = 1 if self.single else len(cache)
         style = Style(caption=self.caption)
-        with progress("rendering", total, self.quiet) as tick:
+        with compiling_said(self.quiet), progress("rendering", total, self.quiet) as tick:
             write(frames, self.path, fps=cache.fps, camera=camera, size=self.size, style=style, progress=tick)
         return total
 

@@ -17,14 +17,13 @@ the first layer, and the other layers hold none yet.
 import math
 
 import numpy as np
-from numba import njit
 
 from pointmass.render.balls import HALO as _HALO
 from pointmass.render.balls import MIN_BALL as _MIN_BALL
 from pointmass.render.balls import MIN_GLOW as _MIN_GLOW
 from pointmass.render.capsules import GLOW_REACH as _REACH
 from pointmass.render.capsules import MIN_GLOW as _MIN_LINE
-from pointmass.render.inner import bare, inner
+from pointmass.render.inner import bare, inner, kernel
 from pointmass.render.kernels_shade import (
     AREA,
     BAND,
@@ -603,7 +602,7 @@ def _hand_over(room, area, picture, bright):
     return spilled
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def sort_into_tiles(box, columns, rows):
     """Lists of the items that touch each tile, in the order given: where each list starts, and all lists.
 
@@ -662,7 +661,7 @@ def _draw_all(items, solid, tables, area, tile, space):
     flush(tile, count)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def draw(
     band, picture, bright, background, camera, offsets, solid_starts, solids, soft_starts, softs,
     faces, face_box, balls, ball_box, capsules, capsule_box, lamp, shadow, matrix,

@@ -9,9 +9,8 @@ They work along lines of one colour, so that the processor does many pixels at o
 import math
 
 import numpy as np
-from numba import njit
 
-from pointmass.render.inner import bare, inner
+from pointmass.render.inner import bare, inner, kernel
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
@@ -55,7 +54,7 @@ def _double(coarse, row, line, wide):
         wide[2 * x + 1] = THREE_QUARTERS * line[x + 1] + QUARTER * line[x + 2]
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def bloom(bright, levels, decay):
     """Spread one plane in place: the sum of blurs, each twice as wide as the last and `decay` times as strong."""
     pyramid = [bright]
@@ -104,7 +103,7 @@ def _tame(red, green, blue):
         blue[x] = scale * b + FADE * _roll(b)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def develop(first, last, image, light, spill, strength, exposure, curve, pattern):
     """Rows [first, last): tone map `light` plus `strength` times `spill` (of half the size) into sRGB bytes."""
     image, light, spill, curve, pattern = bare(image), bare(light), bare(spill), bare(curve), bare(pattern)

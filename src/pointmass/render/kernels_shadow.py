@@ -6,9 +6,8 @@
 import math
 
 import numpy as np
-from numba import njit
 
-from pointmass.render.inner import bare, inner
+from pointmass.render.inner import bare, inner, kernel
 
 FAR = np.float32(np.inf)
 ZERO = np.float32(0.0)
@@ -83,7 +82,7 @@ def _cast_capsule(depth, r0, r1, ax, ay, az, ra, bx, by, bz, rb):
                 _keep_nearest(depth, row, column, az + t * (bz - az) - math.sqrt(rest))
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def cast(first, last, depth, faces, balls, capsules):
     """Write the distance to the nearest caster into the rows [first, last) of `depth`; all in texels."""
     depth, faces, balls, capsules = bare(depth), bare(faces), bare(balls), bare(capsules)
