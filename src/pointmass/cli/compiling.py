@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
-
-import click
 
 
 @contextmanager
@@ -20,7 +19,8 @@ def compiling_said(quiet: bool) -> Iterator[None]:
         def on_start(self, event: Any) -> None:
             if not self.said and event.data["dispatcher"].py_func.__module__.startswith("pointmass.render."):
                 self.said = True
-                click.echo("pointmass: compiling the renderer (once per machine, about 20 s)...", err=True)
+                # By print, not by click: so it comes above a bar.
+                print("pointmass: compiling the renderer (once per machine, about 20 s)...", file=sys.stderr)
 
         def on_end(self, event: Any) -> None:
             """Nothing to say."""
