@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import shutil
 from dataclasses import fields
@@ -220,6 +221,24 @@ def test_frames_before_an_interrupt_are_kept(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         record(SCENES["pendulum"]().build().simulation(), tmp_path / "i.zarr", 9, progress=stop)
     assert len(Cache.open(tmp_path / "i.zarr")) == 3
+
+
+@pytest.mark.parametrize(("where", "call", "frames"), [("create", 1, 0), ("append", 1, 1), ("append", 4, 4)])
+def test_an_interrupt_at_the_end_of_a_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str, call: int, frames: int
+) -> None:
+    written: Any = getattr(Cache, where)
+    calls = itertools.count(1)
+
+    def interrupted(*arguments: Any, **options: Any) -> Any:
+        written(*arguments, **options)
+        if next(calls) == call:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Cache, where, interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        record(SCENES["pendulum"]().build().simulation(), tmp_path / "i.zarr", 9)
+    assert [f.number for f in Cache.open(tmp_path / "i.zarr")] == list(range(frames))
 
 
 def test_what_a_kill_leaves_behind_is_not_seen(tmp_path: Path) -> None:

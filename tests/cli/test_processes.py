@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import signal
@@ -57,14 +58,30 @@ def test_two_hundred_killed_runs_leave_whole_caches(tmp_path: Path) -> None:
         kill_a_run(tmp_path / str(attempt), random.Random(1000 + attempt))
 
 
-def test_control_c_keeps_the_frames_and_says_so(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("number", "code", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
+)
+def test_a_signal_keeps_the_frames_and_says_so(tmp_path: Path, number: signal.Signals, code: int, word: str) -> None:
     process = start(tmp_path, "run", "pendulum", "-o", "c.zarr", "--frames", "100000")
     wait_for_frames(tmp_path / "c.zarr", 3)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     out, err = process.communicate(timeout=30)
     frames = len(Cache.open(tmp_path / "c.zarr"))
-    assert (process.returncode, out) == (130, "")
-    assert err == f"pointmass: interrupted: {frames} frames kept in 'c.zarr'\n"
+    assert (process.returncode, out) == (code, "")
+    assert err == f"pointmass: {word}: {frames} frames kept in 'c.zarr'\n"
+
+
+def test_a_terminated_render_leaves_nothing(tmp_path: Path) -> None:
+    process = start(tmp_path, "render", "pendulum", "-o", "p.mp4", "--frames", "100000", "--json")
+    deadline = time.monotonic() + 60
+    while not list(tmp_path.glob(".pointmass-*/run.zarr/frames/*")):
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+    process.send_signal(signal.SIGTERM)
+    out, err = process.communicate(timeout=30)
+    assert (process.returncode, err) == (143, "pointmass: terminated: 'p.mp4' was not written\n")
+    assert json.loads(out)["interrupted"] is True
+    assert not list(tmp_path.iterdir())
 
 
 def test_threads_change_no_bits(tmp_path: Path) -> None:

@@ -57,7 +57,8 @@ def record(
         for frame in sim.frames(frames, fps):
             writer.add(frame, frames)
     except (Diverged, KeyboardInterrupt):
-        writer.flush()
+        if not writer.writing:  # what an interrupt finds half written stays as it is
+            writer.flush()
         raise
     return writer.flush()
 
@@ -79,6 +80,7 @@ class _Writer:
         self._camera, self._overwrite, self._progress = camera, overwrite, progress
         self._cache: Cache | None = None
         self._waiting: list[Frame] = []
+        self.writing = False
 
     def add(self, frame: Frame, frames: int) -> None:
         self._waiting.append(frame)
@@ -87,6 +89,7 @@ class _Writer:
 
     def flush(self) -> Cache:
         """Write what is held back."""
+        self.writing = True
         if self._cache is None:
             self._cache = self._created()
         while self._waiting:
@@ -94,6 +97,7 @@ class _Writer:
             del self._waiting[0]
             if self._progress is not None:
                 self._progress(len(self._cache))
+        self.writing = False
         return self._cache
 
     def _created(self) -> Cache:

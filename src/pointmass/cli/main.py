@@ -6,8 +6,11 @@ Commands load what they need when they run: `pointmass --help` is there at once.
 from __future__ import annotations
 
 import os
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, NoReturn
 
@@ -16,7 +19,7 @@ import click
 from pointmass import __version__
 from pointmass.errors import Diverged, PointmassError
 
-DONE, BAD_INPUT, DIVERGED, INTERRUPTED = 0, 2, 3, 130
+DONE, BAD_INPUT, DIVERGED = 0, 2, 3
 COMMANDS = {  # module by name of the command, in the order of the help
     "list": "listing",
     "run": "run",
@@ -28,7 +31,21 @@ COMMANDS = {  # module by name of the command, in the order of the help
 
 
 class Interrupted(KeyboardInterrupt):
-    """A Ctrl-C with something to say about what it left behind."""
+    """A Ctrl-C."""
+
+    code, word = 130, "interrupted"
+
+
+class Terminated(Interrupted):
+    """A SIGTERM: a batch system or `kill` ends the command."""
+
+    code, word = 143, "terminated"
+
+
+def stopped(by: KeyboardInterrupt, left_behind: str) -> Interrupted:
+    """The same interrupt with something to say about what it left behind."""
+    kind = Terminated if isinstance(by, Terminated) else Interrupted
+    return kind(f"{kind.word}: {left_behind}")
 
 
 class Commands(click.Group):
@@ -54,7 +71,8 @@ class Commands(click.Group):
 
     def main(self, args: Sequence[str] | None = None, *_: Any, **options: Any) -> NoReturn:
         try:
-            code = super().main(args, "pointmass", standalone_mode=False)
+            with _sigterm_raises():
+                code = super().main(args, "pointmass", standalone_mode=False)
         except click.ClickException as error:
             code = error.code if isinstance(error, Ended) else BAD_INPUT
             click.echo(f"pointmass: {' '.join(error.format_message().split())}", err=True)
@@ -69,12 +87,31 @@ class Ended(click.ClickException):
         self.code = code
 
 
+@contextmanager
+def _sigterm_raises() -> Iterator[None]:
+    """SIGTERM raises `Terminated`, unless somebody else has a use for it."""
+    here = threading.current_thread() is threading.main_thread()
+    if not here or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+        yield
+        return
+
+    def handle(number: int, frame: object) -> NoReturn:
+        raise Terminated
+
+    signal.signal(signal.SIGTERM, handle)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
 def ending(error: BaseException) -> tuple[int, str]:
     """Exit code and sentence for what stopped a command."""
     if isinstance(error, Diverged):
         return DIVERGED, str(error)
     if isinstance(error, KeyboardInterrupt):
-        return INTERRUPTED, str(error) or "interrupted"
+        error = error if isinstance(error, Interrupted) else Interrupted()
+        return error.code, str(error) or error.word
     if isinstance(error, MemoryError):
         return BAD_INPUT, f"there is not enough memory: {error or 'take fewer particles or a smaller picture'}"
     return BAD_INPUT, str(error)
@@ -92,7 +129,7 @@ def main(ctx: click.Context) -> None:
 
     SCENE is the name of a scene that ships with pointmass, see `pointmass list`, or a TOML file, see `pointmass new`.
 
-    Exit codes: 0 done, 2 bad input, 3 the simulation diverged, 130 interrupted.
+    Exit codes: 0 done, 2 bad input, 3 the simulation diverged, 130 interrupted, 143 terminated.
     """
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())

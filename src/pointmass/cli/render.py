@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from pointmass.cli.compiling import compiling_said
-from pointmass.cli.main import Interrupted
+from pointmass.cli.main import stopped
 from pointmass.cli.options import (
     RunOptions,
     as_json,
@@ -72,10 +72,10 @@ def command(
             _from_cache(source, options, drawing, report)
         else:
             _from_scene(source, options, drawing, report)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         report.frames, report.interrupted = 0, True
         report.show(as_json, quiet)
-        raise Interrupted(f"interrupted: {str(path)!r} was not written") from None
+        raise stopped(error, f"{str(path)!r} was not written") from None
     report.show(as_json, quiet)
     if report.diverged is not None:
         raise Diverged(f"{report.diverged}; {str(path)!r} holds the {counted(report.frames)} before it")

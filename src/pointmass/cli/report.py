@@ -24,7 +24,7 @@ class Report:
     path : of what was written.
     frames : how many are in it.
     diverged : why the simulation ended early, if it did.
-    interrupted : whether Ctrl-C ended it.
+    interrupted : whether Ctrl-C or SIGTERM ended it.
     """
 
     command: str

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pointmass.cli.main import Interrupted
+from pointmass.cli.main import stopped
 from pointmass.cli.options import RunOptions, as_json, default_output, load_scene, quiet, run_options
 from pointmass.cli.progress import progress
 from pointmass.cli.report import Report, counted
@@ -38,11 +38,14 @@ def command(scene: str, output: str | None, as_json: bool, quiet: bool, **values
         report.diverged = error
         report.show(as_json, quiet)
         raise _kept(error, report) from error
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
+        from pointmass.cache import Cache
+
         report.interrupted = True
+        report.frames = len(Cache.open(path)) if report.frames else 0  # the last one may not have been counted
         report.show(as_json, quiet)
         kept = f"{counted(report.frames)} kept in {str(path)!r}" if report.frames else "nothing was written"
-        raise Interrupted(f"interrupted: {kept}") from None
+        raise stopped(error, kept) from None
     report.show(as_json, quiet)
 
 
