@@ -7,10 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
-from numba import njit
 
 from pointmass.cli.compiling import compiling_said
+from pointmass.cli.options import use_threads
 
 LINE = "pointmass: compiling the renderer (once per machine, about 20 s)...\n"
 
@@ -20,7 +21,7 @@ def compile_one(module: str) -> None:
         return 1
 
     one.__module__ = module
-    njit(one)()
+    numba.njit(one)()
 
 
 @pytest.mark.parametrize(
@@ -35,6 +36,14 @@ def test_said_once_and_only_of_the_renderer(
         compile_one(module)
     compile_one(module)
     assert capsys.readouterr() == ("", said)
+
+
+def test_a_program_may_call_commands_with_other_threads() -> None:
+    most = numba.get_num_threads()
+    for threads in (1, most, most + 1):
+        use_threads(threads)
+        compile_one("mine")
+        assert numba.get_num_threads() == min(threads, most)
 
 
 @pytest.mark.full

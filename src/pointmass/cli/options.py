@@ -76,15 +76,16 @@ def run_options(command: Command) -> Command:
 
 
 def use_threads(threads: int | None) -> None:
-    """Let Numba run on so many threads; it reads its environment once, when it is imported."""
+    """Let Numba run on so many threads; once it is imported, there cannot be more than it has."""
     if threads is None:
         return
     threads = whole_number("threads", threads, at_least=1)
-    os.environ["NUMBA_NUM_THREADS"] = str(threads)
-    if "numba" in sys.modules:
-        import numba
+    if "numba" not in sys.modules:
+        os.environ["NUMBA_NUM_THREADS"] = str(threads)
+        return
+    import numba
 
-        numba.set_num_threads(min(threads, numba.get_num_threads()))
+    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
 
 
 def load_scene(source: str, options: RunOptions) -> Scene:
