@@ -325,3 +325,29 @@ def test_a_run_that_diverged_can_go_on_when_its_cause_is_gone(name):
     sim.step(60)
     assert sim.t == 2.0
     assert p.x[0, 1] == pytest.approx(-9.81 * 4 / 2, rel=1e-2)
+
+
+@pytest.mark.parametrize("solver", ["symplectic_euler", "rk4", "dopri5", "implicit_euler"])
+def test_a_parameter_that_is_no_longer_allowed_ends_the_run(solver):
+    p = pm.Particles([[0, 0, 0]], [[1, 0, 0]])
+    drag = pm.Drag("0.5 - t")
+    sim = pm.Simulation(pm.ParticleSystem(p, [drag]), solver, 1 / 60, emitters=[pm.Nozzle(rate=100)])
+    for _ in range(2):  # nothing is left of the step that was refused
+        with pytest.raises(
+            pm.InvalidInput, match=r"force drag: at t = 0\.5\d* s, k = -0\.0\d* is not allowed: it must"
+        ):
+            sim.step(100)
+        assert 0.48 < sim.t < 0.52
+        assert (sim.system.t, len(p)) == (sim.t, 1 + np.ceil(100 * sim.t - 1e-9))
+    drag.set(k=0.1)
+    sim.step(30)
+
+
+@pytest.mark.parametrize("k", ["log(t)", "-1 - t", lambda t: pm.sqrt(t - 1), "1/age"])
+def test_a_parameter_is_checked_at_the_start(k):
+    for particles in (pm.Particles([[0, 0, 0]]), pm.Particles([])):
+        system = pm.ParticleSystem(particles, [pm.Drag(k)])
+        if k == "1/age" and not len(particles):
+            continue
+        with pytest.raises(pm.InvalidInput, match=r"force drag: at t = 0 s, k = .* is not allowed"):
+            pm.Simulation(system)

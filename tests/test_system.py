@@ -218,3 +218,25 @@ def test_a_refused_birth_leaves_the_system_as_it_was() -> None:
         system.add([[2, 0, 0]])
     assert len(system.particles) == 2
     assert system.deriv_eval(0.0, system.get_state()).shape == (12,)
+
+
+@pytest.mark.parametrize(
+    ("force", "hint"),
+    [
+        (Drag([1.0, 2.0]), "force drag: k has 2 values for 6 particles"),
+        (Gravity(on="nobody"), "force gravity: unknown group of particles 'nobody'"),
+        (Springs([(0, 9)]), "force springs: springs 0 joins particle 9"),
+    ],
+)
+def test_an_error_says_which_force(force, hint):
+    with pytest.raises(InvalidInput) as error:
+        ParticleSystem(Particles(X), [force])
+    assert str(error.value).startswith(hint)
+
+
+def test_an_error_in_a_run_says_which_force():
+    system = ParticleSystem(Particles(X), [Harmonic("1 - t")])
+    system.set_state(system.get_state(), 2.0)
+    for question in (system.deriv_eval, system.energy, lambda: system.jacobian(2.0, system.get_state())):
+        with pytest.raises(InvalidInput, match=r"force harmonic: at t = 2 s, k_s = -1\.0 is not allowed"):
+            question()

@@ -108,7 +108,10 @@ class Scene:
         """
         copies = [Body(b.particles, [_again(f) for f in b.forces]) for b in self.bodies]
         particles, own = join(copies, self.names, np.dtype(self.dtype))
-        system = ParticleSystem(particles, own + [_again(f) for f in self.forces], [_again(c) for c in self.colliders])
+        forces = [_again(f) for f in self.forces]
+        for k, force in enumerate(forces):
+            force.label = f"forces.{k} ({force.name})"
+        system = ParticleSystem(particles, own + forces, [_again(c) for c in self.colliders])
         solver = None if self.solver is None else _again(self.solver)
         emitters = [_again(e) for e in self.emitters]
         return Simulation(system, solver, self.dt, emitters=emitters, look=self.look, seed=self.seed)

@@ -47,7 +47,8 @@ class Simulation:
     Raises
     ------
     InvalidInput
-        dt that is not positive, something that is not a solver or an emitter.
+        dt that is not positive, something that is not a solver or an emitter, a parameter of a force that is a function
+        of t and not allowed at the start.
 
     Examples
     --------
@@ -98,6 +99,8 @@ class Simulation:
         Diverged
             The run cannot go on; the system keeps its last good state. The error names particle, force, step and the
             largest stable dt.
+        InvalidInput
+            A parameter that is a function of t has a value that is not allowed; the system keeps its last good state.
         """
         for _ in range(whole_number("count", count, at_least=0)):
             self._step()
@@ -186,6 +189,11 @@ class Simulation:
             explained = self._explained(error)
             self.system.remove(np.arange(old, len(self.system.particles)))
             raise explained from error
+        except InvalidInput:  # a parameter that is no longer allowed
+            self.engine.memory = {}
+            self.system.set_state(before, t0)
+            self.system.remove(np.arange(old, len(self.system.particles)))
+            raise
         self.steps += 1
         self._age(t0, t1, clock)
         self._bury(born, t1)
@@ -249,10 +257,10 @@ class Simulation:
         """The largest speed that the start explains: that of the particles, of their fall for a second, across the
         scene."""
         system, p = self.system, self.system.particles
+        with np.errstate(all="ignore"):
+            rate = system.deriv_eval(self.t0, self._start)  # refuses parameters that are not allowed at the start
         if not len(p):
             return 10.0
-        with np.errstate(all="ignore"):
-            rate = system.deriv_eval(self.t0, self._start)
         extent = float(np.ptp(p.x, axis=0).max())
         size = float(np.abs(rate[np.isfinite(rate)]).max(initial=0.0))
         return max(1.0, extent, size, float(np.abs(p.v).max(initial=0.0)))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from pointmass.particles import Array, Particles, Selection
 from pointmass.solvers.base import Solver
 from pointmass.solvers.registry import as_solver
 from pointmass.stability import Stability, stability
+
+T = TypeVar("T")
 
 
 class Filter(Protocol):
@@ -91,7 +93,7 @@ class ParticleSystem:
                 raise InvalidInput(f"colliders must be colliders, such as pm.Plane(), not {collider!r}")
         self.order = self._common_order()
         for force in self.forces:
-            force.bind(particles)
+            _asked(force, force.bind, particles)
 
     # ---------------------------------------------------------------------------------------- the four verbs
 
@@ -138,7 +140,7 @@ class ParticleSystem:
         x, v = self.particles.x if x is None else x, self.particles.v if v is None else v
         for force in self.forces:
             if force.enabled:
-                force.add_forces(self.particles, t, x, v, self.particles.f)
+                _asked(force, force.add_forces, self.particles, t, x, v, self.particles.f)
         if self.filter is not None:
             self.filter.forces(t, x, v, self.particles.m, self.particles.f)
 
@@ -193,7 +195,7 @@ class ParticleSystem:
         blocks = Blocks()
         for force in self.forces:
             if force.enabled:
-                force.add_jacobian(p, self._particle_time(t), x, v, blocks)
+                _asked(force, force.add_jacobian, p, self._particle_time(t), x, v, blocks)
         dx, dv = blocks.matrices(n)
         free = np.repeat(np.where(p.pinned, 0.0, 1.0), 3)
         if self.order == 1:
@@ -213,7 +215,7 @@ class ParticleSystem:
         parts: dict[str, float] = {}
         without = []
         for force in self.forces:
-            value = force.energy(p, self.t, p.x, p.v) if force.enabled else 0.0
+            value = _asked(force, force.energy, p, self.t, p.x, p.v) if force.enabled else 0.0
             if value is None:
                 without.append(force.name)
             else:
@@ -254,7 +256,7 @@ class ParticleSystem:
         ids = self.particles.add(x, v, **columns)
         for k, force in enumerate(self.forces):
             try:
-                force.grow(self.particles, len(ids))
+                _asked(force, force.grow, self.particles, len(ids))
             except InvalidInput:
                 old = np.arange(len(self.particles)) < before
                 for grown in self.forces[:k]:
@@ -304,6 +306,14 @@ class ParticleSystem:
         _, label = connected_components(graph, directed=False)
         _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
         return np.argsort(np.argsort(first))[inverse]  # numbered by their first particle
+
+
+def _asked(force: Force, question: Callable[..., T], *arguments: Any) -> T:
+    """The answer of a force; an error says which force it is about."""
+    try:
+        return question(*arguments)
+    except InvalidInput as error:
+        raise InvalidInput(f"{force.label or f'force {force.name}'}: {error}") from error
 
 
 def _stack(parts: Sequence[NDArray[np.intp]]) -> NDArray[np.intp]:

@@ -18,6 +18,10 @@ BAD = {
     "a formula that is nan": (FORCE + '"field"\nforce = ["log(-1)", "0", "0"]', "forces.0 (field): force 'log(-1)'"),
     "a parameter that is infinite": (FORCE + '"drag"\nk = "9**9**9**9"', "9**9**9 = inf"),
     "a constant that divides by zero": (FORCE + '"field"\npotential = "k*x"\nconstants = {k = "t/0"}', "by zero"),
+    "a parameter that is negative": (FORCE + '"drag"\nk = "-1 - t"', "forces.0 (drag): at t = 0 s, k = -1.0 is"),
+    "a parameter that is nan": (FORCE + '"gravity"\n[[forces]]\ntype = "drag"\nk = "log(t - 1)"', "forces.1 (drag): "),
+    "a name that nobody knows": (FORCE + '"drag"\nk = "2*chrage"', "forces.0 (drag): unknown name in k '2*chrage': "),
+    "a surface that is nowhere": (POINTS + '[[colliders]]\ntype = "plane"\npoint = [0, "log(t)", 0]', "point.y = -inf"),
 }
 
 

@@ -118,6 +118,32 @@ def test_refused_by_the_particles():
         Parameter("k", [1, 2]).check(P, 3, "particles")
 
 
+@pytest.mark.parametrize(
+    ("value", "t", "hint"),
+    [
+        ("1 - t", 2.0, "at t = 2 s, k = -1.0 is not allowed: it must be finite and at least 0 [N]"),
+        (lambda t: 1 - t, 2.0, "at t = 2 s, k = -1.0 is not allowed"),
+        ("log(t)", 0.0, "at t = 0 s, k = -inf is not allowed"),
+        ("log(t - 1)", 0.0, "at t = 0 s, k = nan is not allowed"),
+        ("charge - 6", 0.0, "at t = 0 s, k = -1.0 is not allowed"),
+        ("1/age", 0.0, "at t = 0 s, k = inf is not allowed"),
+    ],
+)
+def test_refused_when_evaluated(value, t, hint):
+    p = Parameter("k", value, unit="N", at_least=0)
+    p.check(P, 3, "particles")
+    for clock in (t, np.array([t, t])):
+        with pytest.raises(InvalidInput) as error:
+            p.of(P, clock, ROWS)
+        assert hint in str(error.value)
+
+
+def test_a_rate_may_be_anything():
+    assert Parameter("k", "sqrt(t)", at_least=0).rate().at(0.25) == (1.0,)
+    assert Parameter("k", "1 - t", at_least=0).rate().at(0.25) == (-1.0,)
+    assert np.isinf(Parameter("k", "log(1 + t)").rate().at(-1.0)[0])
+
+
 def test_rate_is_exact():
     place = Parameter("center", ("sin(2*t)", lambda t: t**3, 4.0), vector=True)
     np.testing.assert_allclose(place.rate().at(0.3), [2 * math.cos(0.6), 0.27, 0], rtol=1e-14)

@@ -32,14 +32,16 @@ class Collider(Described, ABC):
     contact : "swept": nothing tunnels, the time of impact is found; "discrete": the lecture's test at the end of each
         step.
     motion : of the reference point, in time.
+    place : name of that point among the arguments.
     bulges : True where the solid is convex (ball, block): a line between two free points may pass through it. False
         where the free space is convex (plane, inside of a sphere).
     """
 
     bulges: ClassVar[bool] = True
+    place: ClassVar[str] = "center"
 
     def __init__(self, place: Vector, restitution: float, friction: float, eps: float, contact: Contact) -> None:
-        self.motion = Motion(place)
+        self.motion = Motion(place, self.place)
         self.restitution = number("restitution", restitution, at_least=0, at_most=1)
         self.friction = number("friction", friction, at_least=0)
         self.eps = number("eps", eps, above=0, unit="m")

@@ -22,6 +22,7 @@ class Motion:
     Parameters
     ----------
     place : [m], three numbers, or formulas or a function of t.
+    name : of the place, for messages.
 
     Attributes
     ----------
@@ -30,16 +31,17 @@ class Motion:
     Raises
     ------
     InvalidInput
-        It depends on something other than t.
+        It depends on something other than t, or is not finite at the start.
     """
 
-    def __init__(self, place: Vector) -> None:
-        self._place = Parameter("center", place, vector=True, unit="m")
+    def __init__(self, place: Vector, name: str = "center") -> None:
+        self._place = Parameter(name, place, vector=True, unit="m")
         if not self._place.common:
-            raise InvalidInput("the place of a collider may depend on t and nothing else")
+            raise InvalidInput(f"{name} of a collider may depend on t and nothing else")
         self._velocity = self._place.rate()
         self._acceleration = self._velocity.rate()
-        self.fixed: Array | None = np.array(self._place.at(0.0), np.float64) if self._place.constant else None
+        start = self._place.at(0.0)
+        self.fixed: Array | None = np.array(start, np.float64) if self._place.constant else None
 
     def place(self, t: Any) -> Array:
         """The place [m] at time t, shape (3,), or (k, 3) for t of shape (k,)."""

@@ -22,6 +22,7 @@ class Plane(Collider):
     """
 
     bulges: ClassVar[bool] = False
+    place: ClassVar[str] = "point"
 
     def __init__(
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,8 @@ class Polygon(Collider):
     shift : moves the whole plate [m]; a function of t.
     restitution, friction, eps, contact : as for every collider.
     """
+
+    place: ClassVar[str] = "shift"
 
     def __init__(
         self,

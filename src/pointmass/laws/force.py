@@ -65,6 +65,7 @@ class Force(Described, ABC):
     arguments : what the force was made with, or set to since, by name.
     on : particles that it acts on; None = all.
     enabled : whether it acts at all.
+    label : what errors call it; in a scene, its place there, such as "forces.1 (drag)".
     """
 
     order: ClassVar[int] = 2
@@ -74,6 +75,7 @@ class Force(Described, ABC):
         self.parameters = {p.name: p for p in parameters}
         self.on = on
         self.enabled = bool(enabled)
+        self.label = ""
         self._bound: Particles | None = None
 
     def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,8 @@ class Component:
     """One number of a parameter: a constant, a column, or a program of t and particle attributes."""
 
     def __init__(self, name: str, value: Any, bounds: dict[str, float], unit: str) -> None:
-        self.name = name
+        self.name, self.unit = name, unit
+        self.bounds: dict[str, float] | None = bounds  # None: any number, even one that is not finite
         self.value: float | NDArray[np.float64] | Traced
         self.needs: tuple[str, ...] = ()
         self.formula: Formula | None = None
@@ -40,23 +42,45 @@ class Component:
             self.value = trace(value, {"t": "scalar"}, 1, name)
         elif _ndim(value) == 1:
             self.value = finite_array(name, value, (None,))
-            for extreme in (self.value.min(), self.value.max()) if self.value.size else ():
-                number(name, extreme, unit=unit, **bounds)
+            self._check(self.value)
         else:
             self.value = number(name, value, unit=unit, **bounds)
 
     def of(self, particles: Particles, t: Any, rows: Rows) -> Any:
         """The number, or one for each of `rows`."""
-        if isinstance(self.value, Traced):
-            columns = (particles.column(n)[rows] for n in self.needs)
-            return self.value.columns(t, *columns)[0]
         if isinstance(self.value, np.ndarray):
             return self.value[rows].astype(particles.dtype)
-        return self.value
+        return self.at(t, *(particles.column(n)[rows] for n in self.needs))
+
+    def at(self, t: Any, *columns: Any) -> Any:
+        """The number at time t, for the attributes that it needs.
+
+        Raises
+        ------
+        InvalidInput
+            It is not allowed, though at other times it may have been.
+        """
+        if not isinstance(self.value, Traced):
+            return self.value
+        value = self.value.columns(t, *columns)[0]
+        try:
+            self._check(value)
+        except InvalidInput:
+            for now, each in np.broadcast(t, value):  # whose it is, and when
+                with _at(now):
+                    self._check(each)
+        return value
+
+    def _check(self, value: Any) -> None:
+        """Refuse a number, or one of several, that is not finite or out of bounds."""
+        if self.bounds is not None and np.size(value):
+            for extreme in (np.min(value), np.max(value)):
+                number(self.name, extreme, unit=self.unit, **self.bounds)
 
     def rate(self) -> Component:
         """d/dt of the component."""
         result = Component(f"d {self.name}/dt", 0.0, {}, "")
+        result.bounds = None
         if isinstance(self.value, Traced):
             result.value, result.needs, result.formula = self.value.jacobian("t"), self.needs, self.formula
         return result
@@ -90,7 +114,7 @@ class Parameter:
 
     def at(self, t: Any) -> tuple[Any, ...]:
         """The numbers at time t, for a parameter that knows no particles."""
-        return tuple(c.value.columns(t)[0] if isinstance(c.value, Traced) else c.value for c in self.components)
+        return tuple(c.at(t) for c in self.components)
 
     def rate(self) -> Parameter:
         """The parameter's rate of change, exact, from the program of its formula."""
@@ -152,6 +176,14 @@ class Parameter:
         if len(parts) not in (2, 3):
             raise InvalidInput(f"{self.name} must be a function of t that returns three numbers, not {len(parts)}")
         return [*parts, 0.0][axis]
+
+
+@contextmanager
+def _at(t: float) -> Iterator[None]:
+    try:
+        yield
+    except InvalidInput as error:
+        raise InvalidInput(f"at t = {t:.6g} s, {error}") from None
 
 
 def _ndim(value: Any) -> int:

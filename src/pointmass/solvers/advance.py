@@ -141,7 +141,7 @@ class _Run:
             return left
         h: Array = self.memory["h_next"]
         if (unknown := (left > 0.0) & ~(h > 0.0)).any():
-            h = np.where(unknown, self.control.first_step(self.system, self.clock, self.y), h)
+            h = np.where(unknown, self.control.first_step(self.system, self.clock, self.y, left), h)
         return np.where(left > 0.0, h, 0.0)
 
     def _trial(self, h: Array) -> Step:

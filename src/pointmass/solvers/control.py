@@ -87,17 +87,19 @@ class PIController:
                 time=float(clock[i]),
             )
 
-    def first_step(self, system: System, t: Array, y: Array) -> Array:
+    def first_step(self, system: System, t: Array, y: Array, left: Array) -> Array:
         """A step to begin with for each island [s], from the size of y, y' and y''.
 
         Hairer, Norsett and Wanner, sec. II.4: an explicit Euler step of a hundredth of y / y' shows the second
-        derivative, and a step whose terms of that order are a hundredth of the tolerance is proposed.
+        derivative, and a step whose terms of that order are a hundredth of the tolerance is proposed. Nothing is asked
+        beyond the time that is `left`, where forces may mean nothing.
         """
         islands = system.islands
         n, scale = number_of(islands), self._scale(np.abs(y))
         slope = system.deriv_eval(_common(t, islands), y)
         d0, d1 = rms(y / scale, islands, n), rms(slope / scale, islands, n)
         short = np.where((d0 < 1e-5) | ~(d1 >= 1e-5), 1e-6, 0.01 * d0 / np.maximum(d1, 1e-5))
+        short = np.minimum(short, left)
         there = system.deriv_eval(_common(t + short, islands), y + short[islands] * slope)
         d2 = rms((there - slope) / scale, islands, n) / short
         bend = np.maximum(d1, d2)
