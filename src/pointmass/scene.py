@@ -92,7 +92,7 @@ class Scene:
         for what, settings in (("camera", Camera), ("look", Look)):
             if not isinstance(getattr(self, what), settings):
                 raise InvalidInput(f"{what} must be a {settings.__name__}, not {getattr(self, what)!r}")
-        if not self.bodies and not self.emitters:
+        if not self.emitters and not any(len(b.particles) for b in self.bodies):
             raise InvalidInput("a scene needs at least one body or emitter: there are no particles")
         self.names = list(self.names) or _numbered([b.kind or "particles" for b in self.bodies])
         if len(self.names) != len(self.bodies):

@@ -44,9 +44,12 @@ def lattice(
     damping_ratio : of one spring between two of the masses, 1 = critical.
     radius : of a particle [m].
     """
-    shape = tuple(int(c) for c in finite_array("counts", counts, (3,)))
-    if min(shape) < 2:
-        raise InvalidInput(f"counts = {counts} is not allowed: a lattice needs at least 2 particles along each side")
+    along = finite_array("counts", counts, (3,))
+    if (along < 2).any() or (along != np.floor(along)).any():
+        raise InvalidInput(
+            f"counts = {counts} is not allowed: along each side a lattice has a whole number of particles, at least 2"
+        )
+    shape = tuple(int(c) for c in along)
     grid = np.array(list(product(*(range(c) for c in shape))))
     edges = finite_array("size", size, (3,)) / (np.array(shape) - 1)
     if (edges <= 0).any():
