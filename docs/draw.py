@@ -11,7 +11,7 @@ from PIL import Image
 
 import pointmass as pm
 from pointmass.look import linear
-from pointmass.render import image
+from pointmass.render import fit_camera, image
 
 FOLDER = Path(__file__).parent / "images"
 SIZE = (640, 360)
@@ -43,12 +43,11 @@ def drawing(*drawables):
     )
 
 
-def save(name, frame, camera=FACE_ON):
+def save(name, frame, camera=FACE_ON, size=SIZE):
     """Draw a frame into docs/images."""
-    picture = image(frame, camera=camera, size=SIZE)
-    target = FOLDER / f"{name}.png"
-    small = Image.fromarray(picture).quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.FLOYDSTEINBERG)
-    small.save(target, optimize=True)
+    target = FOLDER / f"{name}.jpg"
+    picture = Image.fromarray(image(frame, camera=camera, size=size))
+    picture.save(target, quality=90, subsampling=0, optimize=True)  # smooth glows want more than a PNG's 256 colours
     print(f"{target.name}: {target.stat().st_size / 1000:.0f} kB")
 
 
@@ -57,10 +56,20 @@ def last(frames):
     return deque(frames, maxlen=1)[0]
 
 
-def shipped(name, count, **settings):
-    """A frame of a scene that comes with pointmass, seen by its own camera."""
-    scene = pm.SCENES[name](**settings).build()
-    save(f"scene-{name}", last(scene.simulation().frames(count, scene.fps)), scene.camera)
+def scene_picture(name, scene, number, shown, size=SIZE):
+    """A frame of a scene, by a camera that shows so many frames up to it."""
+    frames = list(scene.simulation().frames(number + 1, scene.fps))
+    save(name, frames[number], fit_camera(frames[-shown:], scene.camera, size), size)
+
+
+def shipped(name, number, shown=1):
+    """A frame of a scene that comes with pointmass."""
+    scene_picture(f"scene-{name}", pm.SCENES[name]().build(), number, shown)
+
+
+def readme():
+    """The picture of the README: the example, by the camera of its film."""
+    scene_picture("fountain", pm.Scene.load(FOLDER.parents[1] / "examples" / "fountain.toml"), 130, 131, (960, 540))
 
 
 # ---------------------------------------------------------------------------------------------------- the lecture
@@ -73,7 +82,7 @@ def flow():
         pm.Particles(start), [pm.Vortex(2.0, (-0.6, 0, 0), eps=0.2), pm.Vortex(-2.0, (0.6, 0, 0), eps=0.2)]
     )
     box = ((-1.6, -0.9, 0.0), (1.6, 0.9, 0.0))
-    look = pm.Look(arrows=24, streamlines=60, field_box=box, size=0.03, trails=1.2)
+    look = pm.Look(arrows=16, streamlines=40, field_box=box, size=0.03, trails=1.2)
     save("flow", last(pm.Simulation(system, look=look).frames(90, 60)))
 
 
@@ -127,7 +136,7 @@ def bounces():
     save(
         "bounces",
         drawing(*surface, *lines),
-        pm.Camera(azimuth=0, elevation=6, fov=25, target=(0, 0.6, 0), position=(0, 1.2, 9)),
+        pm.Camera(fov=25, target=(0, 0.5, 0), position=(0, 1.2, 6.5)),
     )
 
 
@@ -150,7 +159,7 @@ def cloth():
     springs = [pm.Springs(np.concatenate(pairs), 100.0, 0.02, family=name) for name, pairs in families.items()]
     system = pm.ParticleSystem(particles, [pm.Gravity(), pm.Drag(0.01), *springs])
     sim = pm.Simulation(system, pm.SymplecticEuler(), dt=1 / 300, look=pm.Look(spring_width=0.006, color="#e8edf5"))
-    save("cloth", last(sim.frames(40, 60)), pm.Camera(azimuth=55, elevation=25))
+    save("cloth", last(sim.frames(45, 60)), pm.Camera(azimuth=25, elevation=15))
 
 
 # ---------------------------------------------------------------------------------------------------- extending, scenes
@@ -181,7 +190,7 @@ def pendulum():
 
 def bounce():
     """The shipped scene bounce."""
-    shipped("bounce", 75)
+    shipped("bounce", 75, shown=12)
 
 
 def flow_scene():
@@ -196,7 +205,7 @@ def orbit():
 
 def springs():
     """The shipped scene springs."""
-    shipped("springs", 48)
+    shipped("springs", 28, shown=10)
 
 
 def fountain():
@@ -204,7 +213,22 @@ def fountain():
     shipped("fountain", 170)
 
 
-PICTURES = (flow, euler, phase, drag, bounces, cloth, capsule, pendulum, bounce, flow_scene, orbit, springs, fountain)
+PICTURES = (
+    readme,
+    flow,
+    euler,
+    phase,
+    drag,
+    bounces,
+    cloth,
+    capsule,
+    pendulum,
+    bounce,
+    flow_scene,
+    orbit,
+    springs,
+    fountain,
+)
 
 
 if __name__ == "__main__":

@@ -113,3 +113,11 @@ def test_pictures_are_small_and_shown() -> None:
     for picture in sorted((ROOT / "docs" / "images").iterdir()):
         assert picture.stat().st_size < LARGEST, f"{picture.name} has {picture.stat().st_size} bytes"
         assert picture.name in shown, f"{picture.name} is on no page"
+
+
+def test_every_picture_is_drawn_by_the_program() -> None:
+    program = (ROOT / "docs" / "draw.py").read_text(encoding="utf-8")
+    drawn = set(re.findall(r"""(?:save|scene_picture)\("([\w-]+)\"""", program))
+    drawn |= {f"scene-{name}" for name in re.findall(r"""shipped\("(\w+)\"""", program)}
+    assert drawn == {picture.stem for picture in (ROOT / "docs" / "images").iterdir()}
+    assert drawn >= {f"scene-{name}" for name in pm.SCENES}
