@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from typing import Any
 
@@ -59,6 +60,15 @@ def unknown(what: str, name: object, known: Iterable[str]) -> InvalidInput:
     near = get_close_matches(str(name), names, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
     return InvalidInput(f"unknown {what} {name!r}: {hint}known are {', '.join(names) or 'none'}")
+
+
+@contextmanager
+def about(what: str) -> Iterator[None]:
+    """Say at the beginning of an `InvalidInput` what it is about."""
+    try:
+        yield
+    except InvalidInput as error:
+        raise InvalidInput(f"{what}: {error}") from None
 
 
 def floats(value: Any) -> np.ndarray | None:

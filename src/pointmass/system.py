@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.collisions.collider import Collider
-from pointmass.errors import InvalidInput
+from pointmass.errors import InvalidInput, about
 from pointmass.laws.elements import ConstraintForce
 from pointmass.laws.force import Blocks, Force
 from pointmass.particles import Array, Particles, Selection
 from pointmass.solvers.base import Solver
 from pointmass.solvers.registry import as_solver
 from pointmass.stability import Stability, stability
-
-T = TypeVar("T")
 
 
 class Filter(Protocol):
@@ -93,7 +91,8 @@ class ParticleSystem:
                 raise InvalidInput(f"colliders must be colliders, such as pm.Plane(), not {collider!r}")
         self.order = self._common_order()
         for force in self.forces:
-            _asked(force, force.bind, particles)
+            with about(force.called):
+                force.bind(particles)
 
     # ---------------------------------------------------------------------------------------- the four verbs
 
@@ -140,7 +139,7 @@ class ParticleSystem:
         x, v = self.particles.x if x is None else x, self.particles.v if v is None else v
         for force in self.forces:
             if force.enabled:
-                _asked(force, force.add_forces, self.particles, t, x, v, self.particles.f)
+                force.add_forces(self.particles, t, x, v, self.particles.f)
         if self.filter is not None:
             self.filter.forces(t, x, v, self.particles.m, self.particles.f)
 
@@ -195,7 +194,7 @@ class ParticleSystem:
         blocks = Blocks()
         for force in self.forces:
             if force.enabled:
-                _asked(force, force.add_jacobian, p, self._particle_time(t), x, v, blocks)
+                force.add_jacobian(p, self._particle_time(t), x, v, blocks)
         dx, dv = blocks.matrices(n)
         free = np.repeat(np.where(p.pinned, 0.0, 1.0), 3)
         if self.order == 1:
@@ -215,7 +214,7 @@ class ParticleSystem:
         parts: dict[str, float] = {}
         without = []
         for force in self.forces:
-            value = _asked(force, force.energy, p, self.t, p.x, p.v) if force.enabled else 0.0
+            value = force.energy(p, self.t, p.x, p.v) if force.enabled else 0.0
             if value is None:
                 without.append(force.name)
             else:
@@ -238,9 +237,7 @@ class ParticleSystem:
         for force in self.forces:
             if isinstance(force, ConstraintForce) and force.nodes == 2 and len(force.ids):
                 everything = np.arange(len(force.ids))
-                rest = np.broadcast_to(
-                    force.parameters["rest"].of(self.particles, self.t, everything)[0], everything.shape
-                )
+                rest = np.broadcast_to(force.settings(self.particles, self.t, everything)["rest"][0], everything.shape)
                 length = force.values(self.particles, self.particles.x)
                 relative = np.abs(length - rest)[rest > 0] / rest[rest > 0]
                 worst = max(worst, float(relative.max(initial=0.0)))
@@ -256,7 +253,8 @@ class ParticleSystem:
         ids = self.particles.add(x, v, **columns)
         for k, force in enumerate(self.forces):
             try:
-                _asked(force, force.grow, self.particles, len(ids))
+                with about(force.called):
+                    force.grow(self.particles, len(ids))
             except InvalidInput:
                 old = np.arange(len(self.particles)) < before
                 for grown in self.forces[:k]:
@@ -306,14 +304,6 @@ class ParticleSystem:
         _, label = connected_components(graph, directed=False)
         _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
         return np.argsort(np.argsort(first))[inverse]  # numbered by their first particle
-
-
-def _asked(force: Force, question: Callable[..., T], *arguments: Any) -> T:
-    """The answer of a force; an error says which force it is about."""
-    try:
-        return question(*arguments)
-    except InvalidInput as error:
-        raise InvalidInput(f"{force.label or f'force {force.name}'}: {error}") from error
 
 
 def _stack(parts: Sequence[NDArray[np.intp]]) -> NDArray[np.intp]:

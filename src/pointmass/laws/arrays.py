@@ -61,7 +61,7 @@ class ArrayForce(Force):
     def add_jacobian(self, particles: Particles, t: Any, x: Array, v: Array, blocks: Blocks) -> None:
         if self.coupled:
             raise InvalidInput(
-                "it couples particles in NumPy, and implicit solvers need a law: "
+                f"{self.called} couples particles in NumPy, and implicit solvers need a law: "
                 "use pm.spring_force or an explicit solver"
             )
         rows = particles.select(self.on)
@@ -87,9 +87,11 @@ class ArrayForce(Force):
         try:
             result = np.asarray(self.function(x[rows], v[rows], particles.m[rows], now, **self.constants), x.dtype)
         except Exception as error:
-            raise InvalidInput(f"the function failed: {type(error).__name__}: {error}") from error
+            raise InvalidInput(f"{self.called}: the function failed: {type(error).__name__}: {error}") from error
         if result.shape not in ((len(rows), 3), (3,)):
-            raise InvalidInput(f"the function must return an array of shape ({len(rows)}, 3), not {result.shape}")
+            raise InvalidInput(
+                f"{self.called}: the function must return an array of shape ({len(rows)}, 3), not {result.shape}"
+            )
         return np.broadcast_to(result, (len(rows), 3))
 
 

@@ -178,8 +178,7 @@ class ElementForce(Force):
         now = clock(t, rows[:, 0])
         vectors = {f"{n}{a + 1}": q[rows[:, a]] for a in range(self.nodes) for n, q in (("x", x), ("v", v))}
         everything = np.arange(len(rows))
-        parameters = {p.name: p.of(particles, now, everything) for p in self.parameters.values()}
-        return inputs_for(law, vectors, {"t": now}, parameters)
+        return inputs_for(law, vectors, {"t": now}, self.settings(particles, now, everything))
 
 
 class ConstraintForce(ElementForce):

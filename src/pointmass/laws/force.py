@@ -65,7 +65,7 @@ class Force(Described, ABC):
     arguments : what the force was made with, or set to since, by name.
     on : particles that it acts on; None = all.
     enabled : whether it acts at all.
-    label : what errors call it; in a scene, its place there, such as "forces.1 (drag)".
+    label : its place in a scene, such as "forces.1 (drag)", for errors.
     """
 
     order: ClassVar[int] = 2
@@ -88,6 +88,24 @@ class Force(Described, ABC):
     def name(self) -> str:
         """Name for messages, scene files and reports: quadratic_drag for QuadraticDrag."""
         return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", type(self).__name__).lower()
+
+    @property
+    def called(self) -> str:
+        """What errors call it."""
+        return self.label or f"force {self.name}"
+
+    def settings(self, particles: Particles, t: Any, rows: Rows) -> dict[str, tuple[Any, ...]]:
+        """The numbers of each parameter at time t, floats or one for each of `rows` (see `Parameter.of`).
+
+        Raises
+        ------
+        InvalidInput
+            A parameter has a value at time t that is not allowed.
+        """
+        try:
+            return {p.name: p.of(particles, t, rows) for p in self.parameters.values()}
+        except InvalidInput as error:
+            raise InvalidInput(f"{self.called}: {error}") from None
 
     def set(self, **values: Any) -> None:
         """Replace parameters; the values are checked like those of the constructor, and nothing is traced again.

@@ -140,8 +140,8 @@ class PairForce(Force):
         for node, rows, place in (("2", second, np.s_[None, :]), ("1", first, np.s_[:, None])):
             now = clock(t, rows)
             own = {"t": now, f"m{node}": particles.m[rows]}  # t, and parameters that all share, are those of particle 1
-            for p in self.parameters.values():
-                (own[f"{p.name}{node}" if p.name in self.per_particle else p.name],) = p.of(particles, now, rows)
+            for name, (value,) in self.settings(particles, now, rows).items():
+                own[f"{name}{node}" if name in self.per_particle else name] = value
             for q, array in (("x", x), ("v", v)):
                 own |= zip(vector_names(f"{q}{node}"), array[rows].T, strict=True)
             columns |= {n: c[place] if np.ndim(c) else c for n, c in own.items()}

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -67,8 +66,10 @@ class Component:
             self._check(value)
         except InvalidInput:
             for now, each in np.broadcast(t, value):  # whose it is, and when
-                with _at(now):
+                try:
                     self._check(each)
+                except InvalidInput as error:
+                    raise InvalidInput(f"at t = {now:.6g} s, {error}") from None
         return value
 
     def _check(self, value: Any) -> None:
@@ -176,14 +177,6 @@ class Parameter:
         if len(parts) not in (2, 3):
             raise InvalidInput(f"{self.name} must be a function of t that returns three numbers, not {len(parts)}")
         return [*parts, 0.0][axis]
-
-
-@contextmanager
-def _at(t: float) -> Iterator[None]:
-    try:
-        yield
-    except InvalidInput as error:
-        raise InvalidInput(f"at t = {t:.6g} s, {error}") from None
 
 
 def _ndim(value: Any) -> int:

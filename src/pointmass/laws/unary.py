@@ -89,8 +89,8 @@ class UnaryForce(Force):
 
     def _inputs(self, law: Traced, particles: Particles, t: Any, x: Array, v: Array, rows: Any) -> list[Any]:
         now = clock(t, rows)
-        parameters = {p.name: p.of(particles, now, rows) for p in self.parameters.values()}
-        return inputs_for(law, {"x": x[rows], "v": v[rows]}, {"m": particles.m[rows], "t": now}, parameters)
+        scalars = {"m": particles.m[rows], "t": now}
+        return inputs_for(law, {"x": x[rows], "v": v[rows]}, scalars, self.settings(particles, now, rows))
 
 
 class VelocityField(UnaryForce):
