@@ -159,6 +159,11 @@ class Simulation:
             quantities=self.quantities(),
         )
 
+    def births(self, step: int) -> list[Birth]:
+        """Who is born in a step, of each emitter; nothing is changed."""
+        t0, t1 = self._grid(step), self._grid(step + 1)
+        return [e.births(t0, t1, self.seed, f"{type(e).__name__} {k}") for k, e in enumerate(self.emitters)]
+
     def quantities(self) -> dict[str, float]:
         """Diagnostics now: energies [J], momentum [kg m/s], largest relative stretch of a spring, particle count."""
         system = self.system
@@ -178,7 +183,7 @@ class Simulation:
     def _step(self) -> None:
         t0, t1 = self._grid(self.steps), self._grid(self.steps + 1)
         old = len(self.system.particles)
-        born = [e.births(t0, t1, self.seed, f"{type(e).__name__} {k}") for k, e in enumerate(self.emitters)]
+        born = self.births(self.steps)
         clock = self._bear(born, t0)
         before = self.system.get_state()
         try:

@@ -229,7 +229,7 @@ def test_check_says_what_is_safe(folder: Path) -> None:
     result = json.loads(pointmass("check", "pendulum", "--json").stdout)
     assert set(result) == {
         "scene", "solver", "dt", "largest_safe_dt", "frequency", "damping_ratio", "period", "safe",
-        "particles", "springs", "forces",
+        "particles", "springs", "forces", "emitters",
     }  # fmt: skip
     assert result["safe"] is True
     assert (result["particles"], result["springs"], result["solver"]) == (13, 12, "leapfrog")
@@ -243,6 +243,26 @@ def test_check_says_what_is_safe(folder: Path) -> None:
     free = json.loads(pointmass("check", "a.toml", "--set", "forces.1.k=0", "--json").stdout)
     assert (free["largest_safe_dt"], free["period"], free["frequency"], free["safe"]) == (None, None, 0.0, True)
     assert "amplifies this motion at any dt" in pointmass("check", "orbit", "--solver", "euler").stdout
+
+
+def test_check_looks_at_the_first_particle_of_each_emitter(folder: Path) -> None:
+    """A drop of mass m in air of drag k slows down at the rate k/m, however late it is born."""
+    (folder / "late.toml").write_text(
+        """
+        dt = 0.01
+        solver = "rk4"
+        forces = [{type = "drag", k = 0.5}]
+        emitters = [{type = "nozzle", mass = 0.1}, {type = "nozzle", mass = 0.001, start = 0.2, rate = 1.0}]
+        """
+    )
+    result = json.loads(pointmass("check", "late.toml", "--json").stdout)
+    assert (result["particles"], result["emitters"], result["safe"]) == (0, 2, False)
+    assert result["frequency"] == pytest.approx(500.0)
+    assert result["largest_safe_dt"] == pytest.approx(2.785 / 500, rel=1e-3)
+    short = json.loads(pointmass("check", "late.toml", "--json", "--frames", "6").stdout)
+    assert (short["frequency"], short["safe"]) == (pytest.approx(5.0), True)
+    assert json.loads(pointmass("check", "fountain", "--json").stdout)["frequency"] == pytest.approx(0.1)
+    assert "0 particles, 0 springs, 1 force, 2 emitters" in pointmass("check", "late.toml").stdout
 
 
 def test_new_writes_a_scene_that_runs(folder: Path) -> None:

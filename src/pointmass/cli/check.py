@@ -7,12 +7,14 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
 
 from pointmass.cli.options import RunOptions, as_json, load_scene, run_options
 from pointmass.cli.report import finite
 
 if TYPE_CHECKING:
     from pointmass.scene import Scene
+    from pointmass.simulation import Simulation
 
 
 @click.command("check")
@@ -30,12 +32,17 @@ def command(scene: str, as_json: bool, **values: Any) -> None:
 
 
 def stability_report(scene: Scene) -> dict[str, Any]:
-    """The stability of a scene at its start, as numbers for JSON; None where a number is unlimited."""
+    """The stability of a scene at its start, as numbers for JSON; None where a number is unlimited.
+
+    Besides the particles that are there, it looks at the first one of each emitter.
+    """
     from pointmass.laws.elements import ElementForce
     from pointmass.stability import stability
 
     simulation = scene.simulation()
     system, solver = simulation.system, simulation.solver
+    particles = len(system.particles)
+    _add_first_births(simulation, math.ceil((scene.frames - 1) / scene.fps / simulation.dt))
     found = stability(system, solver)
     springs = sum(len(f.ids) for f in system.forces if isinstance(f, ElementForce) and f.nodes == 2)
     return {
@@ -47,10 +54,24 @@ def stability_report(scene: Scene) -> dict[str, Any]:
         "damping_ratio": finite(found.damping_ratio),
         "period": finite(found.period),
         "safe": bool(simulation.dt <= found.largest_safe_dt),
-        "particles": len(system.particles),
+        "particles": particles,
         "springs": springs,
         "forces": len(system.forces),
+        "emitters": len(simulation.emitters),
     }
+
+
+def _add_first_births(simulation: Simulation, steps: int) -> None:
+    """Add to the start the first particle that each emitter makes within so many steps."""
+    waiting = set(range(len(simulation.emitters)))
+    for step in range(steps):
+        for k, birth in enumerate(simulation.births(step)):
+            if k in waiting and len(birth.number):
+                columns = {name: np.ravel(column)[0] for name, column in birth.columns.items()}
+                simulation.system.add(birth.x[:1], birth.v[:1], id=birth.ids(k)[:1], **columns)
+                waiting.remove(k)
+        if not waiting:
+            return
 
 
 def _text(result: dict[str, Any], fps: float) -> str:
@@ -58,7 +79,8 @@ def _text(result: dict[str, Any], fps: float) -> str:
     if result["frequency"]:
         motion = f"{result['frequency']:.4g} rad/s, period {result['period']:.4g} s"
         motion += f", damping ratio {result['damping_ratio']:.3g}"
-    parts = (f"{result[name]} {name}" for name in ("particles", "springs", "forces"))
+    counts = {name: result[name] for name in ("particles", "springs", "forces", "emitters")}
+    parts = (f"{n} {name if n != 1 else name[:-1]}" for name, n in counts.items())
     lines = {
         "scene": result["scene"],
         "at the start": ", ".join(parts),
