@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from pointmass.cache import Cache
 from pointmass.cli import main
 
 POINTS = '[[bodies]]\ntype = "points"\nx = [[0.0, 1.0, 0.0]]\n'
@@ -39,3 +40,16 @@ def test_one_sentence_and_nothing_written(
         assert done.stderr.count("\n") == 1
         assert hint in done.stderr
     assert [p.name for p in tmp_path.iterdir()] == ["bad.toml"]
+
+
+def test_what_turns_bad_in_the_run_keeps_the_frames_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.toml").write_text("dt = 0.01\nfps = 50\n" + FORCE + '"drag"\nk = "0.095 - t"')
+    done = CliRunner().invoke(main, ["run", "bad.toml", "-o", "b.zarr"], catch_exceptions=False)
+    assert (done.exit_code, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert "forces.0 (drag): at t = 0.1 s, k = -0.005" in done.stderr
+    assert "; 6 frames kept in 'b.zarr'" in done.stderr
+    assert len(Cache.open("b.zarr")) == 6
+    done = CliRunner().invoke(main, ["render", "bad.toml", "-o", "b.mp4"], catch_exceptions=False)
+    assert (done.exit_code, done.stderr.count("\n")) == (2, 1)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["b.zarr", "bad.toml"]

@@ -11,7 +11,7 @@ from pointmass.cli.main import stopped
 from pointmass.cli.options import RunOptions, as_json, default_output, load_scene, quiet, run_options
 from pointmass.cli.progress import progress
 from pointmass.cli.report import Report, counted
-from pointmass.errors import Diverged
+from pointmass.errors import Diverged, InvalidInput
 
 if TYPE_CHECKING:
     from pointmass.scene import Scene
@@ -37,7 +37,9 @@ def command(scene: str, output: str | None, as_json: bool, quiet: bool, **values
     except Diverged as error:
         report.diverged = error
         report.show(as_json, quiet)
-        raise _kept(error, report) from error
+        raise Diverged(_kept(error, report)) from error
+    except InvalidInput as error:  # found in the run: a parameter that is a function of t
+        raise (InvalidInput(_kept(error, report)) if report.frames else error) from None
     except KeyboardInterrupt as error:
         from pointmass.cache import Cache
 
@@ -64,5 +66,5 @@ def simulate(scene: Scene, path: Path, report: Report, quiet: bool, *, overwrite
         record(simulation, path, scene.frames, scene.fps, scene=scene, overwrite=overwrite, progress=count)
 
 
-def _kept(error: Diverged, report: Report) -> Diverged:
-    return Diverged(f"{error}; {counted(report.frames)} kept in {str(report.path)!r}")
+def _kept(error: Exception, report: Report) -> str:
+    return f"{error}; {counted(report.frames)} kept in {str(report.path)!r}"
