@@ -55,6 +55,46 @@ def test_scene_passes_its_check_at_full_length(name: str) -> None:
     shipped.check(frames_of(scene, scene.frames))
 
 
+QUICK = {"flow": {"particles": 20, "arrows": 0, "streamlines": 0}, "springs": {"side": 3}, "bounce": {"balls": 10}}
+COSTLY = {"balls", "rate", "links", "side", "particles", "mass", "stiffness", "steps_per_second"}  # only so many steps
+ENDS = [
+    (name, parameter["name"], value)
+    for name, shipped in SCENES.items()
+    for parameter in shipped.parameters()
+    for value in parameter["choices"] or (parameter["minimum"], parameter["maximum"])
+    if parameter["name"] not in COSTLY or value == parameter["minimum"] >= 1
+]
+
+
+def at_end(name: str, parameter: str, value: object, frames: int) -> None:
+    shipped = made(name, {**QUICK.get(name, {}), parameter: value})
+    shipped.check(frames_of(shipped.build(), frames))
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "value"),
+    [
+        ("bounce", "height", 0),  # would begin in the floor
+        ("bounce", "radius", 10),
+        ("bounce", "gravity", 0),  # no energy to compare with
+        ("flow", "speed", 100),  # too fast for the usual step
+        ("pendulum", "damping_ratio", 10),  # too stiff for it
+        ("springs", "height", 0),
+        ("springs", "size", 100),
+        ("springs", "damping_ratio", 5),
+        ("springs", "drag", 10),
+    ],
+)
+def test_the_ends_of_a_range_that_were_hard(name: str, parameter: str, value: object) -> None:
+    at_end(name, parameter, value, 8)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("name", "parameter", "value"), ENDS)
+def test_the_ends_of_every_range(name: str, parameter: str, value: object) -> None:
+    at_end(name, parameter, value, 60)
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_frames_of_a_scene_show_something(name: str) -> None:
     scene = made(name, SMALL.get(name, {})).build()

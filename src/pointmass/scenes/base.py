@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, ClassVar
 
+import numpy as np
+
 from pointmass.errors import InvalidInput, PointmassError, number, unknown
 from pointmass.frame import Frame
 from pointmass.scene import Scene
+from pointmass.solvers.base import Solver
+from pointmass.solvers.stability import largest_safe_step
 
 
 class CheckFailed(PointmassError):
@@ -97,6 +102,17 @@ def expect(holds: bool, sentence: str) -> None:
     """Fail a scene's check with a sentence unless it holds."""
     if not holds:
         raise CheckFailed(sentence)
+
+
+def substeps(solver: Solver, stiffness: float, damping: float) -> int:
+    """Steps in a sixtieth of a second that keep the stiffest motion of a body stable, with some room.
+
+    Parameters
+    ----------
+    stiffness, damping : of that motion, x'' = -stiffness x - damping x' [1/s^2, 1/s]; slower ones have parts of both.
+    """
+    parts = np.linspace(0.1, 1.0, 10)
+    return math.ceil(1 / 60 / (0.8 * largest_safe_step(solver, parts * stiffness, parts * damping)))
 
 
 def _allowed(f: Any, value: Any) -> Any:

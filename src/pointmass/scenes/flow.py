@@ -41,7 +41,7 @@ class FlowScene(ShippedScene):
         return Scene(
             name=self.name,
             summary=self.summary(),
-            dt=1 / 60,
+            dt=1 / 60 / max(1, math.ceil(self.speed / 60 / 0.02)),  # no particle goes farther than 2 cm in a step
             frames=480,
             solver=RK4(),
             bodies=[points(np.round(place, 9), attributes={"dye": (place[:, 0] > 1).astype(float)})],

@@ -13,7 +13,7 @@ from pointmass.forces import Drag, Gravity
 from pointmass.frame import Camera, Frame
 from pointmass.look import Look
 from pointmass.scene import Scene
-from pointmass.scenes.base import ShippedScene, expect, knob
+from pointmass.scenes.base import ShippedScene, expect, knob, substeps
 from pointmass.solvers import Leapfrog
 
 
@@ -35,13 +35,15 @@ class Pendulum(ShippedScene):
     def build(self) -> Scene:
         """A chain at an angle, with gravity."""
         a = math.radians(self.angle)
-        frequency = 2 * math.sqrt(self.stiffness * self.links / self.mass)
+        solver, m = Leapfrog(), self.mass / self.links
+        stiffest = 4 * self.stiffness / m  # neighbours against each other
+        damping = 8 * self.damping_ratio * math.sqrt(self.stiffness / (2 * m)) + self.drag / m
         return Scene(
             name=self.name,
             summary=self.summary(),
-            dt=1 / 60 / max(4, math.ceil(frequency / 60)),
+            dt=1 / 60 / max(4, math.ceil(math.sqrt(stiffest) / 60), substeps(solver, stiffest, damping)),
             frames=300,
-            solver=Leapfrog(),
+            solver=solver,
             bodies=[
                 chain(
                     self.links,

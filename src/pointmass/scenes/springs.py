@@ -12,9 +12,10 @@ from pointmass.bodies import lattice
 from pointmass.collisions import Plane
 from pointmass.forces import Drag, Gravity
 from pointmass.frame import Camera, Frame
+from pointmass.laws import functions as fn
 from pointmass.look import Look
 from pointmass.scene import Scene
-from pointmass.scenes.base import ShippedScene, expect, knob
+from pointmass.scenes.base import ShippedScene, expect, knob, substeps
 from pointmass.solvers import SymplecticEuler
 
 
@@ -29,7 +30,7 @@ class SpringsScene(ShippedScene):
     mass: float = knob(1.0, "mass of the cube", unit="kg", low=1e-6, high=1e6)
     stiffness: float = knob(150.0, "stiffness of an edge spring", unit="N/m", low=0.1, high=1e7)
     damping_ratio: float = knob(0.04, "damping of a spring, 1 = critical", low=0, high=5)
-    height: float = knob(1.7, "height of its centre at the start", unit="m", low=0, high=1000)
+    height: float = knob(0.8, "height of its lowest corner at the start", unit="m", low=0, high=1000)
     tilt: float = knob(40.0, "how far it is turned", unit="degrees", low=-180, high=180)
     restitution: float = knob(0.4, "of the floor", low=0, high=1)
     friction: float = knob(0.6, "of the floor", low=0, high=10)
@@ -39,23 +40,30 @@ class SpringsScene(ShippedScene):
     def build(self) -> Scene:
         """The cube above a floor."""
         m = self.mass / self.side**3
-        fastest = math.sqrt(2 * 16 * self.stiffness / m)  # 6 edge springs and 20 diagonals of half the stiffness
+        radius = 0.18 * self.size / self.side
+        c, s = abs(float(fn.cos(math.radians(self.tilt)))), abs(float(fn.sin(math.radians(self.tilt))))
+        reach = 0.5 * self.size * (c * s + c * c + s)  # from the centre down to the lowest corner
+        solver = SymplecticEuler()
+        # 6 springs along edges and 20 along diagonals, of half the stiffness, pull in all directions; at most both ends
+        # of each move against each other.
+        stiffest = 2 * (6 + 20 / 2) / 3 * self.stiffness / m
+        damping = 2 * (6 + 20 / math.sqrt(2)) / 3 * 2 * self.damping_ratio * math.sqrt(self.stiffness / (2 * m))
         return Scene(
             name=self.name,
             summary=self.summary(),
-            dt=1 / 60 / max(4, math.ceil(fastest / 60 / 2.4 * (1 + self.damping_ratio))),
+            dt=1 / 60 / max(4, substeps(solver, stiffest, damping + self.drag / m)),
             frames=300,
-            solver=SymplecticEuler(),
+            solver=solver,
             bodies=[
                 lattice(
                     (self.side,) * 3,
                     (self.size,) * 3,
-                    center=(0.0, self.height, 0.0),
+                    center=(0.0, self.height + radius + reach, 0.0),
                     tilt=self.tilt,
                     mass=self.mass,
                     k_s=self.stiffness,
                     damping_ratio=self.damping_ratio,
-                    radius=0.18 * self.size / self.side,
+                    radius=radius,
                 )
             ],
             forces=[Gravity((0.0, -self.gravity, 0.0)), Drag(self.drag)],
