@@ -196,6 +196,39 @@ def test_coincident_particles_are_named():
     assert caught.value.particle == 1
 
 
+@pytest.mark.parametrize(
+    ("force", "solver", "dt", "advice"),
+    [
+        (pm.Attractor(), "rk4", 0.01, "it has no finite value there, so soften it or keep particles away"),
+        (pm.Harmonic(100.0), "rk4", 1.0, "the largest stable dt of rk4 is 0.283 s and dt is 1 s"),
+        (
+            pm.Harmonic(100.0),
+            "euler",
+            1.0,
+            "euler amplifies this motion at any dt: use symplectic_euler, rk4 or implicit_euler",
+        ),
+        (
+            pm.Field(("exp(1e3*(t + 1))", "0", "0")),
+            "rk4",
+            0.01,
+            "it has no finite value there, so soften it or keep particles away",
+        ),
+        (pm.Field(("exp(1e4*t)", "0", "0")), "rk4", 0.5, "use a smaller dt or an implicit solver"),
+        (pm.Field(("exp(1e4*t)", "0", "0")), "implicit_euler", 0.5, "use a smaller dt or a larger tolerance"),
+    ],
+)
+def test_the_advice_fits_the_cause(force, solver, dt, advice):
+    """One piece of advice, and then what was found, without another one."""
+    p = pm.Particles([[0, 0, 0] if isinstance(force, pm.Attractor) else [1, 0, 0]])
+    with pytest.raises(pm.Diverged) as caught:
+        pm.Simulation(pm.ParticleSystem(p, [force]), solver, dt).step(1000)
+    head, _, reason = str(caught.value).partition(f"force {force.name}: {advice}")
+    assert head.startswith("diverged in step ")
+    assert reason.startswith(" (")
+    assert reason.endswith(")")
+    assert "use " not in reason
+
+
 def test_a_failed_step_leaves_no_newborns():
     p = pm.Particles([[0, 0, 0], [1.1, 0, 0]])
     p.pin([0])

@@ -295,25 +295,32 @@ class Simulation:
 
     def _explained(self, error: Diverged) -> Diverged:
         """The error with everything that a user wants to know."""
-        system, p = self.system, self.system.particles
-        row, force, partners = culprit(system)
+        p = self.system.particles
+        row, force, singular, partners = culprit(self.system)
         where = f"particle {p.id[row]}" if len(p) else "no particle"
         if partners:
             where += f" and particle {', '.join(str(p.id[r]) for r in partners[:3])}"
         limit = self._largest_safe_dt()
-        advice = "use another solver or softer forces"
-        if limit is not None and 0 < limit < np.inf:
-            advice = f"the largest stable dt of {self.solver.name} is {limit:.3g} s and dt is {self.dt:.3g} s"
-        elif limit == 0:
-            advice = f"{self.solver.name} amplifies this motion at any dt: use symplectic_euler, rk4 or implicit_euler"
+        reason, _, own = str(error).partition(": ")
+        advice = self._advice(singular, limit) or own or "use a smaller dt or softer forces"
         return Diverged(
-            f"diverged in step {self.steps} (t = {self.t:.6g} s) at {where}, force {force}: {advice} ({error})",
+            f"diverged in step {self.steps} (t = {self.t:.6g} s) at {where}, force {force}: {advice} ({reason})",
             particle=int(p.id[row]) if len(p) else None,
             force=force,
             step=self.steps,
             time=self.t,
             largest_safe_dt=limit,
         )
+
+    def _advice(self, singular: bool, limit: float | None) -> str:
+        """What to do, where the forces tell; else an empty string."""
+        if singular:
+            return "it has no finite value there, so soften it or keep particles away"
+        if limit == 0:
+            return f"{self.solver.name} amplifies this motion at any dt: use symplectic_euler, rk4 or implicit_euler"
+        if limit is not None and limit < self.dt:
+            return f"the largest stable dt of {self.solver.name} is {limit:.3g} s and dt is {self.dt:.3g} s"
+        return ""
 
     def _largest_safe_dt(self) -> float | None:
         """From the stiffnesses at the start of the run, before anything was torn apart."""
@@ -328,12 +335,12 @@ class Simulation:
             system.set_state(now)
 
 
-def culprit(system: ParticleSystem) -> tuple[int, str, list[int]]:
-    """Row of the particle that is worst off, the force that acts most on it, and rows of its partners in that
-    force."""
+def culprit(system: ParticleSystem) -> tuple[int, str, bool, list[int]]:
+    """Row of the particle that is worst off, the force that acts most on it, whether that is singular there, and if so
+    rows of its partners in that force."""
     p = system.particles
     if not len(p):
-        return 0, "none", []
+        return 0, "none", False, []
     strengths: dict[str, NDArray[Any]] = {}
     forces = [f for f in system.forces if f.enabled]
     for force in forces:
@@ -346,8 +353,8 @@ def culprit(system: ParticleSystem) -> tuple[int, str, list[int]]:
     total = sum(strengths.values(), np.zeros(len(p)))
     row = int(np.argmax(~np.isfinite(total))) if not np.isfinite(total).all() else int(np.argmax(speed))
     if not strengths:
-        return row, "none", []
+        return row, "none", False, []
     name = max(strengths, key=lambda n: strengths[n][row])
     force = next(f for f in forces if f.name == name)
     singular = not np.isfinite(strengths[name][row])
-    return row, name, force.partners(p, row) if singular else []
+    return row, name, singular, force.partners(p, row) if singular else []

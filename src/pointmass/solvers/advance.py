@@ -166,9 +166,10 @@ class _Run:
         bad = np.flatnonzero(kept[self.islands] & ~np.isfinite(trial.y1))
         if len(bad):
             t = float(self.clock[self.islands[bad[0]]])
+            other = "" if self.solver.implicit else " or an implicit solver"
             raise Diverged(
                 f"entry {bad[0]} of y is no longer finite after a step of {self.solver.name} from t = {t:.6g} s:"
-                " use a smaller dt or an implicit solver",
+                f" use a smaller dt{other}",
                 time=t,
             )
 
