@@ -132,3 +132,16 @@ def test_neighbours_change_no_bits():
             one.step(k / 30, (k + 1) / 30)
         np.testing.assert_array_equal(p.x[2], q.x[0])
         np.testing.assert_array_equal(p.v[2], q.v[0])
+
+
+@pytest.mark.parametrize("solver", [pm.SymplecticEuler(), pm.Leapfrog(), pm.RK4()])
+def test_a_body_of_springs_bounces_without_gaining_energy(solver):
+    x = np.indices((3, 3, 3)).reshape(3, -1).T * 0.25 + [0, 0.5, 0]
+    a, b = np.nonzero(np.tril(np.linalg.norm(x[:, None] - x, axis=2) < 0.45, -1))
+    springs = pm.Springs(np.stack([a, b], axis=1), k_s=200.0)
+    system = pm.ParticleSystem(pm.Particles(x, m=0.05), [springs, pm.Gravity()], [pm.Plane(restitution=1)])
+    start = system.energy().total
+    sim = pm.Simulation(system, solver, dt=1 / 250)
+    for _ in range(6):
+        sim.run(0.5)
+        assert system.energy().total < 1.02 * start
