@@ -21,6 +21,7 @@ DENSE = 900  # islands up to this dimension are solved for all eigenvalues
 WORK = 2  # as long as that is no more work than for this many of them
 WANTED = 4  # eigenvalues of each kind in larger systems
 ACCURACY = 1e-9
+STANDING = 1e-6  # of the fastest motion: slower ones are round-off of those that stand still, double eigenvalues
 ITERATION: dict[str, Any] = {"ncv": 80, "maxiter": 100, "tol": ACCURACY}
 
 
@@ -201,7 +202,8 @@ def _damped(values: Complex, x: Complex, damping: Any, growth: float) -> Modes:
     l^2 + l d + k = 0 with d = x* D x / x* x, and k like it.
     """
     weight = (np.abs(x) ** 2).sum(axis=-2)
-    moves = (weight > 0.0) & (np.abs(values) > 1e-12 * np.abs(values).max(initial=0.0))
+    size = np.abs(values)
+    moves = (weight > 0.0) & (size > STANDING * size.max(axis=-1, initial=0.0, keepdims=True))
     drag = np.where(moves, (np.conj(x) * (damping @ x)).sum(axis=-2) / np.where(moves, weight, 1.0), 0.0)
     drag = _rounded(drag, ACCURACY * np.abs(values))
     pull = _rounded(np.where(moves, -values * (values + drag), 0.0), ACCURACY * np.abs(values) ** 2)
