@@ -84,6 +84,9 @@ def test_meaning(text, value):
         ("+".join("x" * 500), f"more than {DEEPEST}"),
         ("(" * 500 + "x" + ")" * 500, "not a formula"),
         ("sine(x)", "did you mean 'sin'"),
+        ("sin", "k 'sin': sin is a function, so write it with brackets: sin(x)"),
+        ("2*atan2 + x", "atan2 is a function, so write it with brackets: atan2(x, y)"),
+        ("where", "where(x, y, z)"),
         ("1/0", "divides by zero"),
         ("5 % 0", "divides by zero"),
         ("0**-1", "divides by zero"),
@@ -124,6 +127,8 @@ def test_names():
     assert Formula("k*x + sin(pi*t)").names == {"k", "x", "t"}
     with pytest.raises(InvalidInput, match="unknown name in k 'radius \\+ chrage': 'chrage': did you mean 'charge'"):
         Formula("radius + chrage", ["charge", "radius"], what="k")
+    with pytest.raises(InvalidInput, match=r"^unknown name in k: 'chrage': did you mean 'charge'"):
+        Formula("chrage", ["charge", "radius"], what="k")
 
 
 @settings(max_examples=300, deadline=None)

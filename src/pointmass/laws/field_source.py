@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pointmass.errors import InvalidInput, number, shown, unknown
+from pointmass.errors import InvalidInput, number, shown
 from pointmass.laws.formula import CONSTANTS, FUNCTIONS, Formula
 from pointmass.laws.grid import Grid
 from pointmass.laws.parameter import Parameter, Scalar
@@ -83,9 +83,7 @@ class FieldSource:
     def check(self, particles: Particles) -> None:
         """Refuse names that the particles do not have, with all that are known."""
         for formula in self.formulas:
-            known = [*self.variables, *self.constants, *particles.columns]
-            for name in sorted(formula.names - set(known)):
-                raise unknown(f"name in {self.what} {formula.shown!r}:", name, {*known, *CONSTANTS, *FUNCTIONS})
+            formula.restrict([*self.variables, *self.constants, *particles.columns])
 
     def arguments_with(self, arguments: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
         """Arguments of a force with other values: those of constants belong to `constants`."""

@@ -89,7 +89,8 @@ class Formula:
         """Refuse a formula that refers to anything else than `names`."""
         known = set(names)
         for name in sorted(self.names - known):
-            raise unknown(f"name in {self.what} {self.shown!r}:", name, [*known, *CONSTANTS, *FUNCTIONS])
+            inside = "" if name == self.text else f" {self.shown!r}"
+            raise unknown(f"name in {self.what}{inside}:", name, [*known, *CONSTANTS, *FUNCTIONS])
 
     def __call__(self, values: Mapping[str, Any]) -> Any:
         """The value, for numbers, arrays or symbols by name."""
@@ -101,6 +102,11 @@ class Formula:
         if depth > DEEPEST:
             raise InvalidInput(f"{self.what} nests more than {DEEPEST} operations: split it into several formulas")
         values = [self._check(part, depth + 1) for part in self._parts(node)]
+        if isinstance(node, ast.Name) and node.id in FUNCTIONS:
+            call = f"{node.id}({', '.join('xyz'[: FUNCTIONS[node.id][1]])})"
+            raise InvalidInput(
+                f"{self.what} {self.shown!r}: {node.id} is a function, so write it with brackets: {call}"
+            )
         if isinstance(node, ast.Name) and node.id not in CONSTANTS:
             self.names.add(node.id)
             return None
