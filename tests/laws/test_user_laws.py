@@ -58,6 +58,20 @@ def test_closures_vectors_and_numpy():
     np.testing.assert_allclose(force_of(law(k="charge", push=("1", "0", "t")))[3], -4 * V[3] + want[3] + 5 * V[3])
 
 
+def test_where_of_vectors():
+    """Component by component; a number stands for three of it."""
+    right = X[:, :1] > 1
+
+    for law, want in (
+        (lambda x, v, m, t: fn.where(x[0] > 1, x, -2 * v), np.where(right, X, -2 * V)),
+        (lambda x, v, m, t: fn.where(x[0] > 1, (1.0, m, t), 0.0), np.where(right, [1.0, 1.0, 0.0], 0.0)),
+        (lambda x, v, m, t: fn.where(x[0] > 1, np.ones(3), np.array(v)), np.where(right, 1.0, V)),
+        (lambda x, v, m, t: fn.where([c > 0.5 for c in x], x, v), np.where(X > 0.5, X, V)),
+        (lambda x, v, m, t: fn.where(True, x, v), X),
+    ):
+        np.testing.assert_array_equal(force_of(unary_force(law)()), want)
+
+
 def test_parameters_without_defaults():
     @unary_force
     def law(x, v, m, t, k, g):
@@ -126,6 +140,27 @@ def with_if(x, v, m, t):
         (law_of(with_if), "use pm.where"),
         (law_of(lambda x, v, m, t: (x[0], x[1])), "must return 3 numbers, but returned 2"),
         (law_of(lambda x, v, m, t: None), "returned nothing"),
+        (law_of(lambda x, v, m, t: abs(x) * v), "use pm.length(v)"),
+        (law_of(lambda x, v, m, t: (x @ v) * v), "use pm.dot(a, b)"),
+        (law_of(lambda x, v, m, t: (x @ (1.0, 0.0, 0.0)) * v), "use pm.dot(a, b)"),
+        (law_of(lambda x, v, m, t: x**2), "use pm.dot(v, v)"),
+        (law_of(lambda x, v, m, t: 2**x), "use pm.dot(v, v)"),
+        (law_of(lambda x, v, m, t: 1 / x), "divide by pm.length(v)"),
+        (law_of(lambda x, v, m, t: m / x), "divide by pm.length(v)"),
+        (law_of(lambda x, v, m, t: x / v), "divide by pm.length(v)"),
+        (law_of(lambda x, v, m, t: x % 2), "divide by pm.length(v)"),
+        (law_of(lambda x, v, m, t: fn.where(x > 0, 1.0, 0.0) * v), "compare pm.length(v)"),
+        (law_of(lambda x, v, m, t: fn.where(x == v, 1.0, 0.0) * v), "compare pm.length(v)"),
+        (law_of(lambda x, v, m, t: fn.where(m < x, 1.0, 0.0) * v), "compare pm.length(v)"),
+        (law_of(lambda x, v, m, t: v if x else x), "use pm.where"),
+        (law_of(lambda x, v, m, t: x and v), "use pm.where"),
+        (law_of(lambda x, v, m, t: fn.where(x[0] > 0, x, (1.0, 2.0))), "three numbers"),
+        (
+            law_of(lambda x, v, m, t: fn.length(m) * v),
+            "three numbers is wanted, such as x or (1.0, 0.0, 0.0), not a number",
+        ),
+        (law_of(lambda x, v, m, t: fn.cross(x, 2)), "not a number"),
+        (law_of(lambda x, v, m, t: x + 1), "not a number"),
         (law_of(lambda x, v, m, t: (float("nan"), 0, 0)), "computes with nan"),
         (law_of(lambda x, v, m, t: (fn.sqrt(-1.0), 0, 0)), "computes with nan"),
         (law_of(lambda x, v, m, t: (x[0] * np.nan, 0, 0)), "computes with nan"),

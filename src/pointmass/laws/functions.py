@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pointmass.errors import InvalidInput
-from pointmass.laws.program import Symbol, Vector, power, whole_power
+from pointmass.laws.program import Symbol, Vector, power, three, whole_power
 
 Number = Any  # a float, an array or a Symbol
 Triple = tuple[Number, ...]  # a Vector, or any three numbers
@@ -115,18 +115,26 @@ def maximum(a: Number, b: Number) -> Number:
     return operation("max", a, b)
 
 
-def where(condition: Number, a: Number, b: Number) -> Number:
-    """`a` where the condition holds, else `b`: the `if` of a law."""
-    return operation("where", condition, a, b)
+def where(condition: Any, a: Any, b: Any) -> Any:
+    """`a` where the condition holds, else `b`: the `if` of a law. Vectors are taken component by component."""
+    parts = (condition, a, b)
+    traced = any(isinstance(p, Symbol) for p in parts)
+    vectors = [isinstance(p, (tuple, list)) or (traced and isinstance(p, np.ndarray) and p.ndim > 0) for p in parts]
+    if not any(vectors):
+        return operation("where", *parts)
+    triples = (three(p) if vector else (p, p, p) for p, vector in zip(parts, vectors, strict=True))
+    return Vector(where(*each) for each in zip(*triples, strict=True))
 
 
 def dot(a: Triple, b: Triple) -> Number:
     """Scalar product of two vectors."""
+    a, b = three(a), three(b)
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Triple, b: Triple) -> Vector:
     """Vector product."""
+    a, b = three(a), three(b)
     return Vector((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
 
 

@@ -41,6 +41,10 @@ FOLD: dict[str, Callable[..., Any]] = {  # an operation on numbers is done while
     "exponent": lambda a: math.frexp(a)[1],
 }
 CONDITIONS = {"lt", "le", "eq", "and", "or", "not"}  # operations whose result is true or false
+BRANCH = (
+    "a law cannot branch with `if`, `and`, `or`, `not`, min or max: use pm.where(condition, a, b), &, |, ~, "
+    "pm.minimum and pm.maximum"
+)
 JUNCTIONS = {"and", "or", "not"}  # and whose operands are
 
 
@@ -309,10 +313,7 @@ class Symbol:
         return self._flipped("pow", base)
 
     def __bool__(self) -> bool:
-        raise InvalidInput(
-            "a law cannot branch with `if`, `and`, `or`, `not`, min or max: use pm.where(condition, a, b), &, |, ~, "
-            "pm.minimum and pm.maximum"
-        )
+        raise InvalidInput(BRANCH)
 
     def __iter__(self) -> Iterator[Symbol]:
         raise InvalidInput("a number was used as a vector: a vector of a law is a tuple of three numbers")
@@ -369,22 +370,25 @@ UFUNCS: dict[str, Callable[..., Symbol]] = {
 }
 
 
+QUOTIENT = "a vector can only be divided by a number: divide by pm.length(v) or v[0], or each component by itself"
+
+
 class Vector(tuple[Any, ...]):
     """Three numbers of a law, with the operations of vectors: k * v, a + b, -v; `pm.dot` and `pm.cross` of two."""
 
     __slots__ = ()
 
     def __add__(self, other: Any) -> Vector:
-        return Vector(a + b for a, b in zip(self, _three(other), strict=True))
+        return Vector(a + b for a, b in zip(self, three(other), strict=True))
 
     def __radd__(self, other: Any) -> Vector:
-        return Vector(b + a for a, b in zip(self, _three(other), strict=True))
+        return Vector(b + a for a, b in zip(self, three(other), strict=True))
 
     def __sub__(self, other: Any) -> Vector:
-        return Vector(a - b for a, b in zip(self, _three(other), strict=True))
+        return Vector(a - b for a, b in zip(self, three(other), strict=True))
 
     def __rsub__(self, other: Any) -> Vector:
-        return Vector(b - a for a, b in zip(self, _three(other), strict=True))
+        return Vector(b - a for a, b in zip(self, three(other), strict=True))
 
     def __mul__(self, other: Any) -> Vector:
         if isinstance(other, (tuple, list)):
@@ -395,13 +399,40 @@ class Vector(tuple[Any, ...]):
         return self.__mul__(other)
 
     def __truediv__(self, other: Any) -> Vector:
+        if isinstance(other, (tuple, list)):
+            raise InvalidInput(QUOTIENT)
         return Vector(a / other for a in self)
+
+    def __matmul__(self, other: Any) -> Any:
+        if isinstance(other, np.ndarray):
+            return NotImplemented  # a matrix knows what to do with a vector
+        raise InvalidInput("vectors have no operator @: use pm.dot(a, b)")
 
     def __neg__(self) -> Vector:
         return Vector(-a for a in self)
 
     def __pos__(self) -> Vector:
         return self
+
+    def __abs__(self) -> Vector:
+        raise InvalidInput("a vector has no abs: use pm.length(v)")
+
+    def __bool__(self) -> bool:
+        raise InvalidInput(BRANCH)
+
+    def _power(self, other: Any) -> Vector:
+        raise InvalidInput("a vector has no powers: use pm.dot(v, v) or pm.length(v)")
+
+    def _quotient(self, other: Any) -> Vector:
+        raise InvalidInput(QUOTIENT)
+
+    def _order(self, other: Any) -> bool:
+        raise InvalidInput("vectors cannot be compared: compare pm.length(v), pm.dot(a, b) or v[0]")
+
+    __pow__ = __rpow__ = _power
+    __rtruediv__ = __floordiv__ = __rfloordiv__ = __mod__ = __rmod__ = _quotient
+    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = _order
+    __hash__ = None  # type: ignore[assignment]
 
 
 def elementwise(function: Callable[..., Any], *inputs: Any) -> Any:
@@ -434,10 +465,12 @@ def _is_vector(value: Any) -> bool:
     return isinstance(value, Vector) or (isinstance(value, np.ndarray) and value.ndim > 0)
 
 
-def _three(value: Any) -> Any:
+def three(value: Any) -> Any:
+    """A vector of a law, if it is one."""
     if isinstance(value, (tuple, list, np.ndarray)) and len(value) == 3:
         return value
-    raise InvalidInput("to a vector of a law only another vector, three numbers, can be added")
+    given = "a number" if isinstance(value, (Symbol, int, float, np.number)) else type(value).__name__
+    raise InvalidInput(f"a vector of three numbers is wanted, such as x or (1.0, 0.0, 0.0), not {given}")
 
 
 def flatten(value: Any) -> Iterable[Any]:
