@@ -207,6 +207,12 @@ def test_a_law_of_ones_own_runs_and_has_no_text() -> None:
     with pytest.raises(InvalidInput, match="swirl was written in Python and has no text: in a scene file, write a law"):
         scene.to_toml()
     function = Scene(bodies=[pm.points([[1.0, 0.0, 0.0]])], forces=[pm.Drag(lambda t: 1 + t)])
+    sliced = pm.Scene(bodies=[pm.chain(3)], forces=[pm.Gravity(on=slice(1, 3))])
+    assert sliced.simulation().system.forces[-1].on.tolist() == [False, True, True, False]
+    with pytest.raises(InvalidInput, match=r"forces gravity\.on = slice\(1, 3, None\) .* has no text: use .* lists"):
+        sliced.to_toml()
+    listed = pm.Scene(bodies=[pm.chain(3)], forces=[pm.Gravity(on=range(1, 3))])
+    assert pm.Scene.from_toml(listed.to_toml()).forces[0].arguments["on"] == [1, 2]
     with pytest.raises(InvalidInput, match=r"forces drag\.k = .* was written in Python"):
         function.to_toml()
 

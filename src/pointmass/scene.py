@@ -325,13 +325,15 @@ def _plain(value: Any, where: str, folder: Path | None) -> Any:
         return value.tolist()
     if isinstance(value, Mapping):
         return {str(k): _plain(v, where, folder) for k, v in value.items() if v is not None}
-    if isinstance(value, (list, tuple)):
+    if isinstance(value, (list, tuple, range)):
         return [_plain(v, where, folder) for v in value]
     if isinstance(value, Path) or (isinstance(value, str) and where.endswith(".grid")):
         return _way(value, folder)
     if isinstance(value, (str, bool, int, float)):
         return value
-    raise InvalidInput(f"{where} = {value!r} was written in Python and has no text: use a number or a formula")
+    raise InvalidInput(
+        f"{where} = {value!r} was written in Python and has no text: use numbers, formulas or lists of them"
+    )
 
 
 def _plain_grid(grid: Grid, where: str, folder: Path | None) -> Any:
