@@ -60,6 +60,8 @@ def test_input_is_copied():
         ({"x": X, "v": [np.nan, 0, 0]}, "v must be finite"),
         ({"x": X, "m": 0}, "m = 0.0 of particle 0 is not allowed: a mass is positive; to hold a particle, pin it"),
         ({"x": X, "m": [1, 1, -1, 1]}, "of particle 2"),
+        ({"x": X, "m": [1, 1, 1e-320, 1]}, "m = 1e-320 is not allowed: 1/m is too large for float64"),
+        ({"x": X, "m": 1e-39, "dtype": np.float32}, "m = 1e-39 is not allowed: 1/m is too large for float32"),
         ({"x": X, "m": [1, 2]}, "m must have shape"),
         ({"x": X, "m": np.inf}, "m must be finite"),
         ({"x": X, "radius": -1}, "radius = -1.0 is not allowed"),

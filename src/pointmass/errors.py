@@ -59,7 +59,7 @@ def unknown(what: str, name: object, known: Iterable[str]) -> InvalidInput:
     names = sorted(known)
     near = get_close_matches(str(name), names, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
-    return InvalidInput(f"unknown {what} {name!r}: {hint}known are {', '.join(names) or 'none'}")
+    return InvalidInput(f"unknown {what} {shown(name)}: {hint}known are {', '.join(names) or 'none'}")
 
 
 @contextmanager

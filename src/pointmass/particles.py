@@ -105,6 +105,10 @@ class Particles:
             raise InvalidInput(
                 f"m = {m[worst]} of particle {worst} is not allowed: a mass is positive; to hold a particle, pin it"
             )
+        with np.errstate(over="ignore"):
+            w = (1 / m).astype(self.dtype)
+        if not np.isfinite(w).all():
+            raise InvalidInput(f"m = {m.min()} is not allowed: 1/m is too large for {self.dtype}")
         if (radius < 0).any():
             raise InvalidInput(f"radius = {radius.min()} is not allowed: it must be at least 0 [m]")
         for name in attributes:
@@ -117,7 +121,7 @@ class Particles:
             "v": v,
             "f": np.zeros((n, 3)),
             "m": m,
-            "w": 1 / m,
+            "w": w,
             "radius": radius,
             "age": np.zeros(n),
         }

@@ -219,7 +219,8 @@ class ParticleSystem:
                 without.append(force.name)
             else:
                 parts[force.name] = parts.get(force.name, 0.0) + value
-        kinetic = float(0.5 * np.sum(p.m[~p.pinned] * speed2[~p.pinned]))
+        with np.errstate(over="ignore"):
+            kinetic = float(0.5 * np.sum(p.m[~p.pinned] * speed2[~p.pinned]))
         return Energy(kinetic, sum(parts.values()), parts, tuple(without))
 
     def momentum(self) -> Array:
@@ -239,7 +240,8 @@ class ParticleSystem:
                 everything = np.arange(len(force.ids))
                 rest = np.broadcast_to(force.settings(self.particles, self.t, everything)["rest"][0], everything.shape)
                 length = force.values(self.particles, self.particles.x)
-                relative = np.abs(length - rest)[rest > 0] / rest[rest > 0]
+                with np.errstate(over="ignore"):
+                    relative = np.abs(length - rest)[rest > 0] / rest[rest > 0]
                 worst = max(worst, float(relative.max(initial=0.0)))
         return worst
 

@@ -147,6 +147,7 @@ def test_speeds_and_lifetimes_have_their_half_range():
         {"mass": 0},
         {"size": -1},
         {"start": 2, "stop": 2},
+        {"start": -1e12, "rate": 10},
         {"direction": (0, 0, 0)},
         {"position": (0, np.nan, 0)},
         {"colour": "red"},
@@ -156,3 +157,7 @@ def test_wrong_arguments_are_named(wrong):
     with pytest.raises(pm.InvalidInput) as caught:
         pm.Nozzle(**wrong)
     assert any(name in str(caught.value) for name in wrong)
+
+
+def test_a_nozzle_that_opens_after_all_time():
+    assert len(pm.Nozzle(start=1e308).births(0.0, 1e6, 0, "late").number) == 0

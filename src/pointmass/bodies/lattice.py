@@ -64,7 +64,8 @@ def lattice(
     for family, steps in FAMILIES.items():
         pairs = _neighbours(grid, np.array(shape), steps)
         stiffness = k if steps == 1 else 0.5 * k
-        rest = np.linalg.norm(x[pairs[:, 0]] - x[pairs[:, 1]], axis=1)
+        with np.errstate(over="ignore"):  # the springs refuse what is infinite
+            rest = np.linalg.norm(x[pairs[:, 0]] - x[pairs[:, 1]], axis=1)
         forces.append(Springs(pairs, stiffness, float(2 * ratio * np.sqrt(stiffness * m / 2)), rest, family=family))
     return Body(Particles(place, v, m, radius), list(forces))
 

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from pointmass import random
 from pointmass.collisions.collider import unit
-from pointmass.emitters.emitter import Array, Birth, Emitter
+from pointmass.emitters.emitter import CHILDREN, Array, Birth, Emitter
 from pointmass.errors import InvalidInput, finite_array, number
 
 BLOCK = 256  # births that are drawn at once
+MOST = 2.0**CHILDREN  # births that have ids
 NOTHING = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
 
 
@@ -64,7 +65,7 @@ class Nozzle(Emitter):
         self.lifetime_range = number("lifetime_range", lifetime_range, at_least=0, unit="s")
         self.mass = number("mass", mass, above=0, unit="kg")
         self.size = number("size", size, at_least=0, unit="m")
-        self.start = number("start", start, unit="s")
+        self.start = number("start", start, at_least=-MOST / self.rate, unit="s")
         self.stop = math.inf if stop == math.inf else number("stop", stop, above=self.start, unit="s")
         if self.lifetime_range >= self.lifetime:
             raise InvalidInput(
@@ -103,6 +104,8 @@ class Nozzle(Emitter):
 
     def _first(self, t: float) -> int:
         """Number of the first birth that is not before t."""
+        if t <= self.start:
+            return 0
         k = max(0, math.floor((t - self.start) * self.rate) - 1)
         while self.start + k / self.rate < t:
             k += 1

@@ -104,7 +104,7 @@ def _parsed(what: str, formulas: Any, count: int) -> tuple[Formula, ...]:
     parts = [formulas] if count == 1 and not isinstance(formulas, (list, tuple)) else formulas
     if not isinstance(parts, (list, tuple)) or len(parts) not in ({1} if count == 1 else {2, 3}):
         wanted = "one formula" if count == 1 else 'three formulas, such as ("-y", "x", "0")'
-        raise InvalidInput(f"{what} must be {wanted}, not {formulas!r}")
+        raise InvalidInput(f"{what} must be {wanted}, not {shown(formulas)}")
     return tuple(Formula(_text(what, part), what=what) for part in [*parts, "0"][: max(count, 1)])
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.errors import InvalidInput, finite_array, floats, number
+from pointmass.errors import InvalidInput, finite_array, floats, number, shown
 from pointmass.laws.formula import Formula
 from pointmass.laws.program import flatten
 from pointmass.laws.trace import Traced, trace
@@ -169,7 +169,8 @@ class Parameter:
         if not isinstance(value, str) and _ndim(value) == 2:
             return list(finite_array(self.name, value, (None, 3)).T)
         if isinstance(value, str) or not hasattr(value, "__len__") or len(value) not in (2, 3):
-            raise InvalidInput(f"{self.name} must be three numbers or formulas, such as (0, -9.81, 0), not {value!r}")
+            given = shown(value)
+            raise InvalidInput(f"{self.name} must be three numbers or formulas, such as (0, -9.81, 0), not {given}")
         return [*value, 0.0][:3]
 
     def _part(self, vector: Any, axis: int) -> Any:
