@@ -134,9 +134,12 @@ def number(
 
 
 def whole_number(name: str, value: Any, *, at_least: int) -> int:
-    """`value` as an int that is at least `at_least`."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < at_least:
-        raise InvalidInput(f"{name} = {value} is not allowed: it must be a whole number, at least {at_least}")
+    """`value` as an int that is at least `at_least`, of at most 64 bits."""
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not whole or not at_least <= value < 2**63:
+        given = value if isinstance(value, (float, np.number)) else shown(value)
+        large = " and less than 2^63" if whole and value > at_least else ""
+        raise InvalidInput(f"{name} = {given} is not allowed: it must be a whole number, at least {at_least}{large}")
     return int(value)
 
 

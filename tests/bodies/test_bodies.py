@@ -113,6 +113,10 @@ def test_join_shifts_springs_and_names_groups() -> None:
     ("build", "sentence"),
     [
         (lambda: pm.chain(0), "links = 0"),
+        (lambda: pm.chain(2.0), "links = 2.0 is not allowed: it must be a whole number, at least 1$"),
+        (lambda: pm.chain(10**39), "at least 1 and less than 2\\^63"),
+        (lambda: pm.chain(np.zeros((2, 2))), r"links = array\(\[\[0., 0.\], \[0., 0.\]\]\) is"),
+        (lambda: pm.Springs([(0, 1)], family=["shear"]), "family must be a name"),
         (lambda: pm.chain(3, -1.0), "length = -1.0"),
         (lambda: pm.chain(3, pinned="middle"), "unknown value of pinned"),
         (lambda: pm.chain(3, direction=(0, 0, 0)), "direction"),

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pointmass.errors import InvalidInput, shown
 from pointmass.laws import functions as fn
 from pointmass.laws.elements import ConstraintForce
 from pointmass.laws.parameter import Parameter, Scalar
@@ -45,6 +46,8 @@ class Springs(ConstraintForce):
         if rest is not None:
             parameters.append(Parameter("rest", rest, unit="m", at_least=0))
         super().__init__(pairs, parameters, enabled)
+        if not isinstance(family, str):
+            raise InvalidInput(f"family must be a name, such as 'shear', not {shown(family)}")
         self.family = family
 
     @staticmethod
