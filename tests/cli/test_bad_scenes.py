@@ -18,6 +18,7 @@ BAD = {
     "a pin of nobody": (POINTS + "pinned = 1\n", "rows of particles"),
     "nobody": ('[[bodies]]\ntype = "points"\nx = []\n', "there are no particles"),
     "half a particle": ('[[bodies]]\ntype = "lattice"\ncounts = [2.5, 2, 2]\n', "counts = [2.5, 2, 2] is not allowed"),
+    "more than there is room for": ('[[bodies]]\ntype = "lattice"\ncounts = [100000, 100000, 100000]\n', "into memory"),
     "a formula that is nan": (FORCE + '"field"\nforce = ["log(-1)", "0", "0"]', "forces.0 (field): force 'log(-1)'"),
     "a parameter that is infinite": (FORCE + '"drag"\nk = "9**9**9**9"', "9**9**9 = inf"),
     "a constant that divides by zero": (FORCE + '"field"\npotential = "k*x"\nconstants = {k = "t/0"}', "by zero"),

@@ -50,7 +50,7 @@ def lattice(
             f"counts = {counts} is not allowed: along each side a lattice has a whole number of particles, at least 2"
         )
     shape = tuple(int(c) for c in along)
-    grid = np.array(list(product(*(range(c) for c in shape))))
+    grid = np.ascontiguousarray(np.indices(shape).reshape(3, -1).T)  # the last coordinate runs fastest
     edges = finite_array("size", size, (3,)) / (np.array(shape) - 1)
     if (edges <= 0).any():
         raise InvalidInput(f"size = {size} is not allowed: each side must be greater than 0 [m]")
