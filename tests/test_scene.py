@@ -237,6 +237,7 @@ def test_switched_off_forces_stay_off() -> None:
         ({"solver": "rk4"}, "solver must be a solver"),
         ({"dt": 0}, "dt = 0 is not allowed"),
         ({"seed": -1}, "seed = -1 is not allowed"),
+        ({"seed": 2**63}, "seed = 9223372036854775808 is not allowed"),  # its text could not be read again
     ],
 )
 def test_wrong_values_in_python(values: dict[str, Any], sentence: str) -> None:
@@ -548,3 +549,9 @@ def test_look_keeps_its_defaults_out_of_the_text() -> None:
         bodies=[pm.chain(2)], look=Look(color_by="speed", color_range=(0.0, 2.0)), camera=pm.Camera(fov=30.0)
     ).to_toml()
     assert text.endswith('[camera]\nfov = 30.0\n\n[look]\ncolor_by = "speed"\ncolor_range = [0.0, 2.0]\n')
+
+
+def test_marks_of_windows_editors_are_no_mistakes(tmp_path: Path) -> None:
+    text = '[[bodies]]\ntype = "chain"\nlinks = 2\n'
+    (tmp_path / "w.toml").write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
+    assert Scene.load(tmp_path / "w.toml") == Scene.from_toml(text)

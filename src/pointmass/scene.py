@@ -19,7 +19,7 @@ from pointmass.collisions.collider import Collider
 from pointmass.description import Described
 from pointmass.emitters import EMITTERS
 from pointmass.emitters.emitter import Emitter
-from pointmass.errors import InvalidInput, number, whole_number
+from pointmass.errors import InvalidInput, number, shown, whole_number
 from pointmass.forces import FORCES, load_grid
 from pointmass.frame import Camera
 from pointmass.laws.force import Force
@@ -83,6 +83,8 @@ class Scene:
         self.fps = number("fps", self.fps, above=0, unit="1/s")
         self.frames = whole_number("frames", self.frames, at_least=1)
         self.seed = whole_number("seed", self.seed, at_least=0)
+        if self.seed >= 2**63:  # TOML holds no more
+            raise InvalidInput(f"seed = {shown(self.seed)} is not allowed: it must be below 2**63")
         if self.dtype not in ("float64", "float32"):
             raise InvalidInput(f"dtype = {self.dtype!r} is not allowed: it must be float64 or float32")
         for what, kind in HOLDS.items():
@@ -219,7 +221,7 @@ class Scene:
         """A scene from a TOML file."""
         path = Path(path)
         try:
-            text = path.read_text(encoding="utf-8")
+            text = path.read_text(encoding="utf-8-sig")  # some editors on Windows begin a file with a mark
         except (OSError, UnicodeDecodeError) as error:
             reason = getattr(error, "strerror", None) or "it is not text in UTF-8"
             raise InvalidInput(f"cannot read the scene {str(path)!r}: {reason}") from None

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import json
 import os
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
@@ -359,7 +362,20 @@ def old_files(folder: Path) -> Path:
     pointmass("run", "a.toml", "-o", "old.zarr", "--frames", "2")
     (folder / "folder.mp4").mkdir()
     (folder / "old.mp4").write_text("old film")
+    (folder / "scene.png").write_text(SCENE)
     return folder
+
+
+def full_disk(*_: object, **__: object) -> NoReturn:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@contextmanager
+def opened_on_full(path: Path, *_: object, **__: object) -> Iterator[io.StringIO]:
+    """What is written lies in a buffer until the file is closed, and there is no room for it then."""
+    path.touch()
+    yield io.StringIO()
+    full_disk()
 
 
 def assert_refused(folder: Path, arguments: list[str], sentence: str = "") -> None:
@@ -421,10 +437,21 @@ def test_bad_renders(old_files: Path, monkeypatch: pytest.MonkeyPatch, arguments
         (["check", "pendlum"], "unknown scene"),
         (["new", "scene.txt"], "ends in .toml"),
         (["new", "none/scene.toml"], "cannot write 'none/scene.toml'"),
+        (["run", "a.toml", "--seed", str(2**63)], "seed = 9223372036854775808 is not allowed"),
+        (["render", "scene.png", "-o", "./scene.png"], "is the scene itself"),
     ],
 )
 def test_bad_commands(old_files: Path, arguments: list[str], sentence: str) -> None:
     assert_refused(old_files, arguments, sentence)
+
+
+def test_a_full_disk_is_said_and_nothing_is_left(old_files: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = Path.open
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "open", lambda p, mode="r", **k: (opened_on_full if mode == "x" else opened)(p, mode, **k))
+        assert_refused(old_files, ["new", "n.toml"], "cannot write 'n.toml': No space left")
+    monkeypatch.setattr("PIL.Image.Image.save", full_disk)
+    assert_refused(old_files, ["render", "old.zarr", "-o", "f.png", *SMALL], "cannot write 'f.png': No space left")
 
 
 def test_a_damaged_cache_is_refused(old_files: Path) -> None:

@@ -67,6 +67,8 @@ def command(
     report = Report(command="render", path=path)
     view = {"azimuth": azimuth, "elevation": elevation, "fov": fov}
     drawing = Drawing(path, parse_size(size), frame, caption, view, quiet)
+    if Path(source).is_file() and path.exists() and path.samefile(source):
+        raise InvalidInput(f"cannot write {str(path)!r}: it is the scene itself")
     try:
         if Path(source).is_dir():
             _from_cache(source, options, drawing, report)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import re
 import shutil
 import tempfile
@@ -26,6 +27,7 @@ BT709 = 1  # FFmpeg's number for the colours of HD video
 LIMITED = 1  # luma from 16 to 235
 GIF_TICKS = 100  # a GIF counts time in hundredths of a second
 SLOWEST, FASTEST = 0.001, 1000  # frames per second
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # no room for a film
 NUMBERED = re.compile(r"[^%]*%(0[1-9])?d[^%]*")  # names of a sequence
 
 
@@ -266,6 +268,10 @@ def write(
         _draw(frames, make(folder / target.name, size, rate), camera, size, style, progress)
         for made in sorted(folder.iterdir()):
             made.replace(target.parent / made.name)
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        raise InvalidInput(f"cannot write {str(target)!r}: {error.strerror}") from None
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
