@@ -145,3 +145,27 @@ def test_a_body_of_springs_bounces_without_gaining_energy(solver):
     for _ in range(6):
         sim.run(0.5)
         assert system.energy().total < 1.02 * start
+
+
+@pytest.mark.parametrize("name", sorted(n for n, solver in SOLVERS.items() if solver.implicit))
+def test_implicit_steps_of_float32_end_at_its_round_off(name):
+    ends = []
+    for dtype in (np.float32, np.float64):
+        particles = pm.Particles([[i, 0, 0] for i in range(8)], m=0.2, dtype=dtype)
+        particles.pin([0])
+        springs = pm.Springs([[i, i + 1] for i in range(7)], k_s=5e3, k_d=1.0)
+        system = pm.ParticleSystem(particles, [pm.Gravity(), pm.QuadraticDrag(c=0.1), springs])
+        sim = pm.Simulation(system, SOLVERS[name](), dt=1 / 60)
+        sim.step(30)
+        ends.append(particles.x.astype(float))
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-2)
+
+
+@pytest.mark.parametrize("name", sorted(n for n, solver in SOLVERS.items() if solver.implicit))
+def test_implicit_steps_of_float32_slide_in_a_bowl(name):
+    bowl = pm.Sphere(radius=2.2, inside=True, restitution=0.0, friction=1.0)
+    x, v = np.random.default_rng(0).normal(size=(2, 40, 3)) * [[[0.5]], [[10.0]]]
+    e, p = engine(x, v, [bowl], [pm.Gravity()], SOLVERS[name](), dtype=np.float32)
+    for k in range(40):
+        e.step(k / 60, (k + 1) / 60)
+    assert (bowl.distance(p.x, 40 / 60) > -1e-5).all()

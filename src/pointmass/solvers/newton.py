@@ -96,10 +96,13 @@ class _Stage:
         self.n = number_of(system.islands)
         velocity = (np.arange(len(z)) >= len(z) // 2) & (system.order == 2)
         self.groups: Islands = (system.islands + self.n * velocity).astype(np.intp)  # x and v have different units
+        self.precision = float(np.finfo(np.float64).eps)
 
     def residual(self, y: Array) -> Array:
         """y - z - gamma F(t, y), shape (dim,)."""
-        r: Array = y - self.z - self.gamma * self.system.deriv_eval(self.t, y)
+        slope = self.system.deriv_eval(self.t, y)
+        self.precision = float(np.finfo(np.result_type(slope, np.float32)).eps)  # a float32 system has no finer F
+        r: Array = y - self.z - self.gamma * slope
         return r
 
     def unsolved(self, r: Array) -> Mask:
@@ -115,7 +118,7 @@ class _Stage:
         groups, n = self.groups, 2 * self.n
         size = largest(self.z, groups, n) + largest(y - self.z - r, groups, n)
         roundoff = np.abs(y) + self.gamma * (abs(jacobian) @ np.abs(y))
-        noise = ROUNDINGS * np.finfo(np.float64).eps * largest(roundoff, groups, n)
+        noise = ROUNDINGS * self.precision * largest(roundoff, groups, n)
         return np.maximum(tolerance * size + noise, np.finfo(np.float64).tiny)
 
     def excess(self, r: Array, allowed: Array) -> Array:
