@@ -384,3 +384,14 @@ def test_a_parameter_is_checked_at_the_start(k):
             continue
         with pytest.raises(pm.InvalidInput, match=r"force drag: at t = 0 s, k = .* is not allowed"):
             pm.Simulation(system)
+
+
+def test_a_numpy_force_is_not_asked_about_nobody():
+    @pm.array_force(coupled=True)
+    def gather(x, v, m, t):
+        assert len(x)
+        return x.mean(axis=0) - x
+
+    for others in ([], [pm.Gravitation(eps=0.1)]):
+        system = pm.ParticleSystem(pm.Particles([]), [gather, *others])
+        pm.Simulation(system, emitters=[pm.Nozzle(rate=30, start=0.05)], dt=0.01).step(20)

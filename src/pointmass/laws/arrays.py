@@ -56,7 +56,8 @@ class ArrayForce(Force):
 
     def add_forces(self, particles: Particles, t: Any, x: Array, v: Array, f: Array) -> None:
         rows = particles.select(self.on)
-        f[rows] += self._evaluate(particles, t, x, v, rows)
+        if len(rows):  # a mean of nobody is not a number
+            f[rows] += self._evaluate(particles, t, x, v, rows)
 
     def add_jacobian(self, particles: Particles, t: Any, x: Array, v: Array, blocks: Blocks) -> None:
         if self.coupled:
