@@ -170,3 +170,17 @@ def test_charges_on_springs_in_a_magnetic_field_with_drag(solver) -> None:
     limit = system.stability(solver).largest_safe_dt
     assert not grows(system, solver, 0.999 * limit)
     assert grows(system, solver, 1.6 * limit)
+
+
+@pytest.mark.parametrize("n", [4, 22])
+def test_a_damped_sheet_of_unequal_masses(n):
+    """Solved for all motions (4) and for the fastest ones (22): one limit, for the splitting method a little lower."""
+    system = sheet(n, k_d=0.5)
+    system.particles.m[:] = np.linspace(0.5, 1.5, n * n)
+    undamped = sheet(n)
+    undamped.particles.m[:] = system.particles.m
+    free = undamped.stability("symplectic_euler").largest_safe_dt
+    omega = 2.0 / free
+    zeta = 0.5 * omega / 200.0  # k_d/k_s = 2 zeta/omega for every motion
+    limit = system.stability("symplectic_euler").largest_safe_dt
+    assert limit == pytest.approx(2 * (np.sqrt(1 + zeta**2) - zeta) / omega, rel=1e-4)

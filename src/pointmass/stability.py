@@ -97,7 +97,7 @@ class Modes(NamedTuple):
 
 def _linearised(system: ParticleSystem) -> Any:
     """d(deriv_eval)/dy now, for x and v times the root of the mass: symmetric where forces have a potential."""
-    from scipy.sparse import csr_array, diags_array
+    from scipy.sparse import csr_array
 
     if not len(system.particles):
         return csr_array((0, 0))
@@ -107,7 +107,10 @@ def _linearised(system: ParticleSystem) -> Any:
     if system.order == 1:
         return matrix
     root = np.tile(np.sqrt(np.where(np.isfinite(system.inertia), system.inertia, 1.0)), 2)
-    return (diags_array(root) @ matrix @ diags_array(1.0 / root)).tocsr()
+    entries = matrix.tocoo()
+    row, column = entries.coords
+    scaled = entries.data * root[row] / root[column]  # x' = v stays exactly that
+    return csr_array((scaled, (row, column)), shape=matrix.shape)
 
 
 def _modes(system: ParticleSystem, matrix: Any) -> Modes:
@@ -205,9 +208,9 @@ def _damped(values: Complex, x: Complex, damping: Any, growth: float) -> Modes:
     size = np.abs(values)
     moves = (weight > 0.0) & (size > STANDING * size.max(axis=-1, initial=0.0, keepdims=True))
     drag = np.where(moves, (np.conj(x) * (damping @ x)).sum(axis=-2) / np.where(moves, weight, 1.0), 0.0)
-    drag = _rounded(drag, ACCURACY * np.abs(values))
-    pull = _rounded(np.where(moves, -values * (values + drag), 0.0), ACCURACY * np.abs(values) ** 2)
-    alone = (-drag - values).real > ACCURACY * np.abs(values)  # its partner grows, and hides what this one does
+    drag = _rounded(drag, ACCURACY * size)
+    pull = _rounded(np.where(moves, -values * (values + drag), 0.0), ACCURACY * size**2)
+    alone = moves & ((-drag - values).real > ACCURACY * size)  # its partner grows, and hides what this one does
     return Modes(values, np.where(alone, 0.0, pull), np.where(alone, -values, drag), growth)
 
 
