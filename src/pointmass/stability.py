@@ -156,29 +156,39 @@ def _of_blocks(blocks: Array, order: int) -> Modes:
 
 def _extreme(matrix: Any, order: int) -> Modes:
     """The modes that limit steps, by ARPACK's iterations from a fixed vector: the same answer each time."""
-    from scipy.sparse.linalg import ArpackNoConvergence, eigs, eigsh
+    from scipy.sparse.linalg import ArpackNoConvergence, eigs
 
-    start, n = np.cos(np.arange(matrix.shape[0])), matrix.shape[0] // 2
+    n = matrix.shape[0] // 2
     pull, damping = -matrix[n:, :n], -matrix[n:, n:]
-    growth = 0.0
-    if order == 2 and _is_symmetric(pull):
-        if not damping.count_nonzero():
-            squares = eigsh(pull, k=WANTED, which="LA", v0=start[:n], tol=ACCURACY, return_eigenvectors=False)
-            return _undamped(squares)
-        least = eigsh(pull, k=1, which="SA", v0=start[:n], tol=0.1, return_eigenvectors=False)
-        growth = math.sqrt(max(-float(least[0]), 0.0))
+    if order == 2 and _is_symmetric(pull) and _is_symmetric(damping):
+        return _stiffest(pull, damping)
     found: list[tuple[Any, Any]] = []
     for which in ("LM", "LI", "SR"):
         try:
-            found.append(eigs(matrix, WANTED, v0=start, which=which, **ITERATION))
+            found.append(eigs(matrix, WANTED, v0=np.cos(np.arange(2 * n)), which=which, **ITERATION))
         except ArpackNoConvergence as error:  # where all motions are of one kind, another kind is not found
             found.append((error.eigenvalues, error.eigenvectors))
     values = np.concatenate([each for each, _ in found]).astype(complex)
     if not len(values):
         raise InvalidInput("the highest frequency of this system could not be found: try a smaller part of it")
     vectors = np.concatenate([each for _, each in found], axis=1)
-    growth = max(growth, float(values.real.max()))
+    growth = float(values.real.max(initial=0.0))
     return _first_order(values, growth) if order == 1 else _damped(values, vectors[:n], damping, growth)
+
+
+def _stiffest(pull: Any, damping: Any) -> Modes:
+    """The motions of largest stiffness and of largest damping: modes where they share them, else close to some."""
+    from scipy.sparse.linalg import eigsh
+
+    start = np.cos(np.arange(pull.shape[0]))
+    least = eigsh(pull, k=1, which="SA", v0=start, tol=0.1, return_eigenvectors=False)
+    growth = math.sqrt(max(-float(least[0]), 0.0))
+    matrices = [m for m in (pull, damping) if m.count_nonzero()]
+    x = np.concatenate([eigsh(m, k=WANTED, which="LA", v0=start, tol=ACCURACY)[1] for m in matrices], axis=1)
+    k, d = ((x * (m @ x)).sum(axis=0).astype(complex) for m in (pull, damping))
+    root = np.sqrt(0.25 * d * d - k)
+    values = np.asarray(np.concatenate([root, -root]) - 0.5 * np.tile(d, 2), np.complex128)
+    return Modes(values, np.tile(k, 2), np.tile(d, 2), growth)
 
 
 def _is_symmetric(matrix: Any) -> bool:
