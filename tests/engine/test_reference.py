@@ -169,3 +169,16 @@ def test_implicit_steps_of_float32_slide_in_a_bowl(name):
     for k in range(40):
         e.step(k / 60, (k + 1) / 60)
     assert (bowl.distance(p.x, 40 / 60) > -1e-5).all()
+
+
+def test_discrete_contact_leaves_nobody_inside_who_is_just_lifting_off():
+    """Backward Euler turns the velocity of who slides down a ball outwards while the ball falls away below."""
+    ball = pm.Sphere((0, -1, 0), radius=0.9, restitution=0, friction=1.0, contact="discrete")
+    rng = np.random.default_rng(0)
+    x, radius = rng.uniform(-1.2, 1.2, (300, 3)), rng.uniform(0, 0.12, 300)
+    x, radius = (each[ball.distance(x, 0.0) - radius > 0.02][:40] for each in (x, radius))
+    v, m = rng.normal(size=x.shape), rng.uniform(0.2, 2, len(x))
+    e, p = engine(x, v, [ball], [pm.Gravity()], solver=pm.ImplicitEuler(), radius=radius, m=m)
+    for k in range(50):
+        e.step(k / 400, (k + 1) / 400)
+        assert (ball.distance(p.x, 0) - p.radius).min() > -1e-12

@@ -66,6 +66,7 @@ class ReferenceEngine:
         surfaces = [s for c in self.system.colliders for s in c.surfaces]
         self._swept = [s for s in surfaces if s.contact == "swept"]
         self._discrete = [s for s in surfaces if s.contact == "discrete"] if self.system.order == 2 else []
+        self._walls = [*self._swept, *self._discrete]
         self._contacts = Contacts(surfaces, self.system.order, self.solver.implicit)
         self._pieces: list[Piece] = []
         self._ids = self.system.particles.id
@@ -219,8 +220,8 @@ class ReferenceEngine:
             linked = np.unique(hit[~self._alone[hit] & ~self._tired(hit)])
             if len(linked):
                 self._pay(linked, paths.v1[linked], planned, x, v, end)
-            now = np.where(np.isnan(clock[islands]), end, clock[islands])
-            self._evict(x, v, now, moved)
+        now = np.where(np.isnan(clock[islands]), end, clock[islands])
+        self._evict(x, v, now, moved)
         fix = y - step.y1
         _by_particle(fix, system.order)[:, ~np.isnan(clock[islands])] = 0
         self._keep(step, h, fix)
@@ -329,7 +330,7 @@ class ReferenceEngine:
         radius = self.system.particles.radius
         for _ in range(EVICTIONS):
             clean = True
-            for surface in self._swept:
+            for surface in self._walls:
                 gap = surface.distance(x, t) - radius
                 rows = np.flatnonzero(moved & (gap < 0))
                 if not len(rows):
@@ -346,7 +347,7 @@ class ReferenceEngine:
 
     def _send_back(self, x: Array, v: Array, t: Array, moved: Mask) -> None:
         """Whom surfaces push to and fro in a narrow corner rests where it was when the step began."""
-        for surface in self._swept:
+        for surface in self._walls:
             rows = np.flatnonzero(moved)
             gap = surface.distance(x[rows], t[rows]) - self.system.particles.radius[rows]
             stuck = gap < self._depth(surface, rows) - _roundoff(x[rows])
