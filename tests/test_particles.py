@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import pointmass as pm
 from pointmass.errors import InvalidInput
 from pointmass.forces import Gravity
 from pointmass.particles import Particles
@@ -219,3 +220,38 @@ def test_names_that_formulas_need_are_no_attributes(name: str) -> None:
 def test_a_force_acts_on_a_slice() -> None:
     system = ParticleSystem(Particles(X), [Gravity((0, -1, 0), on=slice(1, 3))])
     assert system.deriv_eval().reshape(2, 4, 3)[1, :, 1].tolist() == [0, -1, -1, 0]
+
+
+def test_columns_may_be_assigned_as_a_whole():
+    p = pm.Particles([[0, 0, 0], [1, 0, 0]], m=[1, 2], dtype=np.float32)
+    p.pin([1])
+    x = p.x
+    p.x, p.v, p.m, p.radius = [[1, 2, 3], [4, 5, 6]], (0, 1), 4, [0.1, 0.2]
+    assert p.x is x
+    assert p.x.dtype == p.m.dtype == np.float32
+    np.testing.assert_array_equal(p.x, [[1, 2, 3], [4, 5, 6]])
+    np.testing.assert_array_equal(p.v, [[0, 1, 0], [0, 1, 0]])
+    np.testing.assert_array_equal(p.w, [0.25, 0])
+    p.m[:] = 8
+    np.testing.assert_array_equal(p.w, [0.125, 0])
+    p.unpin([1])
+    np.testing.assert_array_equal(p.w, [0.125, 0.125])
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("x", [[np.nan, 0, 0]] * 2), ("x", [[0, 0, 0]] * 3), ("v", "fast"), ("m", 0), ("radius", -1)]
+)
+def test_an_assignment_is_checked_and_leaves_what_was_there(name, value):
+    p = pm.Particles([[0, 0, 0], [1, 0, 0]])
+    before = getattr(p, name).copy()
+    with pytest.raises(pm.InvalidInput, match=name):
+        setattr(p, name, value)
+    np.testing.assert_array_equal(getattr(p, name), before)
+
+
+def test_inverse_masses_and_pins_are_only_read():
+    p = pm.Particles([[0, 0, 0]])
+    with pytest.raises(ValueError, match="read-only"):
+        p.w[0] = 0
+    with pytest.raises(ValueError, match="read-only"):
+        p.pinned[0] = True

@@ -395,3 +395,9 @@ def test_a_numpy_force_is_not_asked_about_nobody():
     for others in ([], [pm.Gravitation(eps=0.1)]):
         system = pm.ParticleSystem(pm.Particles([]), [gather, *others])
         pm.Simulation(system, emitters=[pm.Nozzle(rate=30, start=0.05)], dt=0.01).step(20)
+
+
+@pytest.mark.parametrize("wrong", [None, pm.Particles([[0, 0, 0]]), 3])
+def test_only_a_system_can_be_simulated(wrong):
+    with pytest.raises(pm.InvalidInput, match=r"pm\.ParticleSystem"):
+        pm.Simulation(wrong)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from keyword import iskeyword
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -14,7 +15,66 @@ Array = NDArray[np.floating[Any]]
 Selection = str | slice | ArrayLike | None  # a group's name, a mask, rows; None = all
 FIRST_FOREIGN_ID = 2**40  # ids from here on are made by emitters, and leave no mark on the count
 NOT_ATTRIBUTES = ("t", "y", "z", "vx", "vy", "vz", "e", "pi", "dtype", "self")  # these mean something else
-FIELDS = ("x", "v", "f", "m", "w", "age", "radius", "id")
+FIELDS = ("x", "v", "f", "m", "w", "age", "radius", "id", "pinned")
+
+
+class Column:
+    """A column of particles. Assigning to it copies numbers of the right shape into the array that is there."""
+
+    def __init__(self, checked: Callable[[str, Any, int], Array]) -> None:
+        self._checked = checked
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    @overload
+    def __get__(self, particles: None, owner: type | None = None) -> Column: ...
+    @overload
+    def __get__(self, particles: Particles, owner: type | None = None) -> Array: ...
+    def __get__(self, particles: Particles | None, owner: type | None = None) -> Column | Array:
+        return self if particles is None else particles._arrays[self.name]
+
+    def __set__(self, particles: Particles, value: ArrayLike) -> None:
+        new = self._checked(self.name, value, len(particles))
+        particles._arrays[self.name][...] = particles._cast(self.name, new)
+
+
+def _points(name: str, value: ArrayLike, n: int | None = None) -> Array:
+    array = floats(value)
+    if array is None:
+        return finite_array(name, value, (n, 3))  # says what is wrong
+    if array.size == 0:
+        return finite_array(name, np.zeros((0, 3)), (n, 3))
+    array = np.atleast_2d(array)
+    if array.ndim == 2 and array.shape[1] == 2:
+        array = np.column_stack([array, np.zeros(len(array))])
+    if n is not None and array.shape == (1, 3):
+        array = np.repeat(array, n, axis=0)
+    return finite_array(name, array, (n, 3))
+
+
+def _column(name: str, value: ArrayLike, n: int) -> Array:
+    array = floats(value)
+    if array is not None and array.ndim == 0:
+        return np.full(n, finite_array(name, array, ()))
+    return finite_array(name, value, (n,))
+
+
+def _masses(name: str, value: ArrayLike, n: int) -> Array:
+    m = _column(name, value, n)
+    if (m <= 0).any():
+        worst = int(np.argmax(m <= 0))
+        raise InvalidInput(
+            f"m = {m[worst]} of particle {worst} is not allowed: a mass is positive; to hold a particle, pin it"
+        )
+    return m
+
+
+def _lengths(name: str, value: ArrayLike, n: int) -> Array:
+    radius = _column(name, value, n)
+    if (radius < 0).any():
+        raise InvalidInput(f"radius = {radius.min()} is not allowed: it must be at least 0 [m]")
+    return radius
 
 
 class Particles:
@@ -25,7 +85,8 @@ class Particles:
     x, v : positions [m] and velocities [m/s], shape (n, 3).
     f : force accumulators [N] (order 1: velocity accumulators [m/s]), shape (n, 3).
     m : masses [kg], shape (n,), positive.
-    w : inverse masses [1/kg], shape (n,); 0 = pinned.
+    w : inverse masses [1/kg], shape (n,); 0 = pinned. Follows from m and the pins, so it is only read.
+    pinned : which particles are held where they are, shape (n,); see `pin`.
     radius : [m], shape (n,); a particle touches a collider at this distance.
     age : [s], shape (n,).
     id : shape (n,), int64; never used again once a particle is gone.
@@ -42,8 +103,12 @@ class Particles:
     Raises
     ------
     InvalidInput
-        A shape that does not fit, a number that is not finite, a mass that is not positive.
+        A shape that does not fit, a number that is not finite, a mass that is not positive; also when a column is
+        assigned, as in ``p.v = (0, 0, 1)``.
     """
+
+    x, v, f = Column(_points), Column(_points), Column(_points)
+    m, radius, age = Column(_masses), Column(_lengths), Column(_column)
 
     def __init__(
         self,
@@ -60,9 +125,9 @@ class Particles:
         self.groups: dict[str, NDArray[np.bool_]] = {}
         self.version = 0
         self._next_id = 0
-        empty = np.zeros((0, 3), self.dtype)
-        self.x, self.v, self.f = empty, empty.copy(), empty.copy()
-        self.m, self.w, self.radius, self.age = (np.zeros(0, self.dtype) for _ in range(4))
+        self._arrays = {name: np.zeros((0, 3), self.dtype) for name in "xvf"}
+        self._arrays |= {name: np.zeros(0, self.dtype) for name in ("m", "radius", "age")}
+        self._held = np.zeros(0, bool)
         self.id = np.zeros(0, np.int64)
         for name in attributes:
             self.attributes[attribute_name(name)] = np.zeros(0, self.dtype)
@@ -76,8 +141,11 @@ class Particles:
 
     @property
     def pinned(self) -> NDArray[np.bool_]:
-        """Which particles are held where they are, shape (n,)."""
-        return np.equal(self.w, 0)
+        return _read_only(self._held.copy())
+
+    @property
+    def w(self) -> Array:
+        return _read_only(np.where(self._held, 0, 1 / self.m).astype(self.dtype))
 
     def add(
         self,
@@ -99,41 +167,25 @@ class Particles:
         x = _points("x", x)
         n = len(x)
         v = np.zeros((n, 3)) if v is None else _points("v", v, n)
-        m, radius = _column("m", m, n), _column("radius", radius, n)
-        if (m <= 0).any():
-            worst = int(np.argmax(m <= 0))
-            raise InvalidInput(
-                f"m = {m[worst]} of particle {worst} is not allowed: a mass is positive; to hold a particle, pin it"
-            )
+        m, radius = _masses("m", m, n), _lengths("radius", radius, n)
         with np.errstate(over="ignore"):
-            w = (1 / m).astype(self.dtype)
-        if not np.isfinite(w).all():
-            raise InvalidInput(f"m = {m.min()} is not allowed: 1/m is too large for {self.dtype}")
-        if (radius < 0).any():
-            raise InvalidInput(f"radius = {radius.min()} is not allowed: it must be at least 0 [m]")
+            if not np.isfinite((1 / m).astype(self.dtype)).all():
+                raise InvalidInput(f"m = {m.min()} is not allowed: 1/m is too large for {self.dtype}")
         for name in attributes:
             if name not in self.attributes:
                 raise unknown("particle attribute", name, self.attributes)
         columns = {name: _column(name, attributes.get(name, 0.0), n) for name in self.attributes}
         ids = self._new_ids(n, id)
-        new: dict[str, Array] = {
-            "x": x,
-            "v": v,
-            "f": np.zeros((n, 3)),
-            "m": m,
-            "w": w,
-            "radius": radius,
-            "age": np.zeros(n),
-        }
+        new = {"x": x, "v": v, "f": np.zeros((n, 3)), "m": m, "radius": radius, "age": np.zeros(n)}
         new, columns = ({name: self._cast(name, part) for name, part in d.items()} for d in (new, columns))
         self._next_id = max(self._next_id, int(ids[ids < FIRST_FOREIGN_ID].max(initial=-1)) + 1)
         for name, values in new.items():
-            setattr(self, name, np.concatenate([getattr(self, name), values]))
+            self._arrays[name] = np.concatenate([self._arrays[name], values])
         for name, values in columns.items():
             self.attributes[name] = np.concatenate([self.attributes[name], values])
         for name, mask in self.groups.items():
             self.groups[name] = np.concatenate([mask, np.zeros(n, bool)])
-        self.id = np.concatenate([self.id, ids])
+        self.id, self._held = np.concatenate([self.id, ids]), np.concatenate([self._held, np.zeros(n, bool)])
         self.version += 1
         return ids
 
@@ -145,8 +197,8 @@ class Particles:
 
     def keep(self, mask: NDArray[np.bool_]) -> None:
         """Keep the particles of a mask, in order."""
-        for name in FIELDS:
-            setattr(self, name, getattr(self, name)[mask])
+        self._arrays = {name: values[mask] for name, values in self._arrays.items()}
+        self.id, self._held = self.id[mask], self._held[mask]
         self.attributes = {name: values[mask] for name, values in self.attributes.items()}
         self.groups = {name: values[mask] for name, values in self.groups.items()}
         self.version += 1
@@ -194,14 +246,13 @@ class Particles:
     def pin(self, which: Selection) -> None:
         """Hold particles where they are: inverse mass 0 (never a large mass), velocity 0."""
         rows = self.select(which)
-        self.w[rows] = 0
+        self._held[rows] = True
         self.v[rows] = 0
         self.version += 1
 
     def unpin(self, which: Selection) -> None:
         """Let particles go."""
-        rows = self.select(which)
-        self.w[rows] = 1 / self.m[rows]
+        self._held[self.select(which)] = False
         self.version += 1
 
     def rows(self, ids: ArrayLike) -> NDArray[np.intp]:
@@ -246,6 +297,11 @@ class Particles:
         return result
 
 
+def _read_only(array: NDArray[Any]) -> NDArray[Any]:
+    array.flags.writeable = False
+    return array
+
+
 def attribute_name(name: object) -> str:
     """The name of a further column, if it is one that formulas can say and that means nothing else.
 
@@ -268,24 +324,3 @@ def _dtype(dtype: DTypeLike) -> np.dtype[Any]:
     if result not in (np.float64, np.float32):
         raise InvalidInput(f"dtype = {dtype} is not allowed: it must be float64 or float32")
     return result
-
-
-def _points(name: str, value: ArrayLike, n: int | None = None) -> Array:
-    array = floats(value)
-    if array is None:
-        return finite_array(name, value, (n, 3))  # says what is wrong
-    if array.size == 0:
-        return finite_array(name, np.zeros((0, 3)), (n, 3))
-    array = np.atleast_2d(array)
-    if array.ndim == 2 and array.shape[1] == 2:
-        array = np.column_stack([array, np.zeros(len(array))])
-    if n is not None and array.shape == (1, 3):
-        array = np.repeat(array, n, axis=0)
-    return finite_array(name, array, (n, 3))
-
-
-def _column(name: str, value: ArrayLike, n: int) -> Array:
-    array = floats(value)
-    if array is not None and array.ndim == 0:
-        return np.full(n, finite_array(name, array, ()))
-    return finite_array(name, value, (n,))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pointmass.emitters.emitter import Birth, Emitter
 from pointmass.engine.reference import ReferenceEngine
-from pointmass.errors import Diverged, InvalidInput, number, whole_number
+from pointmass.errors import Diverged, InvalidInput, number, shown, whole_number
 from pointmass.frame import Frame
 from pointmass.look import Look, Stage
 from pointmass.particles import Array
@@ -67,6 +67,8 @@ class Simulation:
         look: Look | None = None,
         seed: int = 0,
     ) -> None:
+        if not isinstance(system, ParticleSystem):
+            raise InvalidInput(f"system must be a pm.ParticleSystem, not {shown(system)}")
         self.system = system
         self.solver = as_solver(solver or ("symplectic_euler" if system.order == 2 else "rk4"))
         self.dt = number("dt", dt, above=0, unit="s")

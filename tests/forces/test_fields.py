@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import pointmass as pm
 from pointmass.errors import InvalidInput
 from pointmass.forces import FORCES, Drag, Field, Flow, Gravity, Vortex, Wind, find_force
 from pointmass.laws.force import Force
@@ -137,3 +138,9 @@ def test_columns_of_the_field_in_a_wind_follow_removal():
     before = system.deriv_eval().reshape(2, 3, 3)
     system.remove([1])
     np.testing.assert_array_equal(system.deriv_eval().reshape(2, 2, 3), before[:, [0, 2]])
+
+
+def test_a_potential_without_a_value_has_no_force_either():
+    system = pm.ParticleSystem(pm.Particles([[0, 0, 0]]), [pm.Field(potential="sqrt(x - 5)")])
+    with pytest.raises(pm.Diverged, match="field"):
+        pm.Simulation(system).step()

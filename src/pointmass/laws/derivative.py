@@ -12,7 +12,7 @@ Rule = Callable[..., Any]  # (result, *operands, *their derivatives) -> derivati
 
 
 def _sqrt(r: Symbol, a: Symbol, da: Any) -> Any:
-    return fn.where(r > 0.0, 0.5 * da / fn.where(r > 0.0, r, 1.0), 0.0)
+    return 0.5 * da * fn.inverse(r)  # 0 where r is 0: the length of nothing; NaN stays what it is
 
 
 def _pow(r: Symbol, a: Symbol, b: Symbol, da: Any, db: Any) -> Any:
