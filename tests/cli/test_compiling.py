@@ -39,11 +39,14 @@ def test_said_once_and_only_of_the_renderer(
 
 
 def test_a_program_may_call_commands_with_other_threads() -> None:
-    most = numba.get_num_threads()
-    for threads in (1, most, most + 1):
-        use_threads(threads)
-        compile_one("mine")
-        assert numba.get_num_threads() == min(threads, most)
+    before, most = numba.get_num_threads(), numba.config.NUMBA_NUM_THREADS
+    try:
+        for threads in (1, most, most + 1):
+            use_threads(threads)
+            compile_one("mine")
+            assert numba.get_num_threads() == min(threads, most)
+    finally:
+        numba.set_num_threads(before)
 
 
 @pytest.mark.full
