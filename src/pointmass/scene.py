@@ -378,6 +378,8 @@ def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, fol
 def _grid(value: Any, folder: Path | None) -> Any:
     settings = dict(value) if isinstance(value, Mapping) else {"path": value}
     path = str(settings.pop("path"))
+    if "\0" in path:
+        raise InvalidInput(f"grid = {path!r} is not allowed: no file has a name with a zero character")
     # Found again from wherever this scene, or a cache that keeps its text, is read.
     path = path if folder is None else str((folder / path).resolve())
     return load_grid(path, **settings) if settings else path

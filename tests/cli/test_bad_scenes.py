@@ -25,6 +25,7 @@ BAD = {
     "a parameter that is negative": (FORCE + '"drag"\nk = "-1 - t"', "forces.0 (drag): at t = 0 s, k = -1.0 is"),
     "a parameter that is nan": (FORCE + '"gravity"\n[[forces]]\ntype = "drag"\nk = "log(t - 1)"', "forces.1 (drag): "),
     "a name that nobody knows": (FORCE + '"drag"\nk = "2*chrage"', "forces.0 (drag): unknown name in k '2*chrage': "),
+    "a file that cannot be": (FORCE + '"field"\ngrid = "a\\u0000b.npz"', "zero character"),
     "a surface that is nowhere": (POINTS + '[[colliders]]\ntype = "plane"\npoint = [0, "log(t)", 0]', "point.y = -inf"),
 }
 

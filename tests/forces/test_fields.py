@@ -144,3 +144,9 @@ def test_a_potential_without_a_value_has_no_force_either():
     system = pm.ParticleSystem(pm.Particles([[0, 0, 0]]), [pm.Field(potential="sqrt(x - 5)")])
     with pytest.raises(pm.Diverged, match="field"):
         pm.Simulation(system).step()
+
+
+@pytest.mark.parametrize(("name", "why"), [("a b", "one word"), ("sin", "another meaning"), ("x", "another meaning")])
+def test_the_name_of_a_constant_is_a_free_word(name, why):
+    with pytest.raises(InvalidInput, match=why):
+        Field(("x", "0", "0"), constants={name: 1.0})

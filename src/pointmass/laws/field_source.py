@@ -93,7 +93,9 @@ class FieldSource:
 
     def _parameters(self) -> list[Parameter]:
         for name in self.constants:
-            if not name.isidentifier() or name in (*self.variables, *CONSTANTS, *FUNCTIONS):
+            if not name.isidentifier():
+                raise InvalidInput(f"constant {name!r} of {self.what} is not allowed: a name is one word")
+            if name in (*self.variables, *CONSTANTS, *FUNCTIONS):
                 raise InvalidInput(f"constant {name!r} of {self.what} is not allowed: the name has another meaning")
         names = set().union(*(formula.names for formula in self.formulas))
         attributes = sorted(names - set(self.variables) - set(self.constants))
