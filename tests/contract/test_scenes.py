@@ -153,3 +153,10 @@ def test_scene_parameters_are_checked_in_one_sentence() -> None:
         SCENES["pendulum"].with_settings({"lenght": 1})
     with pytest.raises(InvalidInput, match=r"known are figure_eight, kepler"):
         SCENES["orbit"].with_settings({"kind": "square"})
+
+
+@pytest.mark.full
+def test_an_undamped_cube_on_an_elastic_floor_gains_no_energy() -> None:
+    scene = SCENES["springs"](restitution=1.0, damping_ratio=0.0, drag=0.0, friction=0.0)
+    described = scene.build()
+    scene.check(list(described.simulation().frames(described.frames, described.fps)))

@@ -18,6 +18,8 @@ from pointmass.scene import Scene
 from pointmass.scenes.base import ShippedScene, expect, knob, substeps
 from pointmass.solvers import SymplecticEuler
 
+LIVELY = 0.5  # a floor that gives more than this back
+
 
 @dataclass(frozen=True, kw_only=True)
 class SpringsScene(ShippedScene):
@@ -47,6 +49,8 @@ class SpringsScene(ShippedScene):
         # 6 springs along edges and 20 along diagonals, of half the stiffness, pull in all directions; at most both ends
         # of each move against each other.
         stiffest = 2 * (6 + 20 / 2) / 3 * self.stiffness / m
+        if self.restitution > LIVELY:
+            stiffest *= 4  # impacts add energy to steps above half the limit, unless the bounce takes more away
         damping = 2 * (6 + 20 / math.sqrt(2)) / 3 * 2 * self.damping_ratio * math.sqrt(self.stiffness / (2 * m))
         return Scene(
             name=self.name,
