@@ -150,66 +150,6 @@ from .laws.elements import (
 from .laws.elements import (
     spring_force as spring_force,
 )
-from .laws.functions import (
-    absolute as absolute,
-)
-from .laws.functions import (
-    add as add,
-)
-from .laws.functions import (
-    atan2 as atan2,
-)
-from .laws.functions import (
-    cos as cos,
-)
-from .laws.functions import (
-    cross as cross,
-)
-from .laws.functions import (
-    dot as dot,
-)
-from .laws.functions import (
-    exp as exp,
-)
-from .laws.functions import (
-    floor as floor,
-)
-from .laws.functions import (
-    inverse as inverse,
-)
-from .laws.functions import (
-    length as length,
-)
-from .laws.functions import (
-    log as log,
-)
-from .laws.functions import (
-    maximum as maximum,
-)
-from .laws.functions import (
-    minimum as minimum,
-)
-from .laws.functions import (
-    pow as pow,
-)
-from .laws.functions import (
-    scale as scale,
-)
-from .laws.functions import (
-    sin as sin,
-)
-from .laws.functions import (
-    sqrt as sqrt,
-)
-from .laws.functions import (
-    sub as sub,
-)
-from .laws.functions import (
-    tan as tan,
-)
-from .laws.functions import (
-    where as where,
-)
 from .laws.grid import (
     Grid as Grid,
 )
@@ -302,6 +242,66 @@ from .stability import (
 )
 from .system import (
     ParticleSystem as ParticleSystem,
+)
+from .tracing.functions import (
+    absolute as absolute,
+)
+from .tracing.functions import (
+    add as add,
+)
+from .tracing.functions import (
+    atan2 as atan2,
+)
+from .tracing.functions import (
+    cos as cos,
+)
+from .tracing.functions import (
+    cross as cross,
+)
+from .tracing.functions import (
+    dot as dot,
+)
+from .tracing.functions import (
+    exp as exp,
+)
+from .tracing.functions import (
+    floor as floor,
+)
+from .tracing.functions import (
+    inverse as inverse,
+)
+from .tracing.functions import (
+    length as length,
+)
+from .tracing.functions import (
+    log as log,
+)
+from .tracing.functions import (
+    maximum as maximum,
+)
+from .tracing.functions import (
+    minimum as minimum,
+)
+from .tracing.functions import (
+    pow as pow,
+)
+from .tracing.functions import (
+    scale as scale,
+)
+from .tracing.functions import (
+    sin as sin,
+)
+from .tracing.functions import (
+    sqrt as sqrt,
+)
+from .tracing.functions import (
+    sub as sub,
+)
+from .tracing.functions import (
+    tan as tan,
+)
+from .tracing.functions import (
+    where as where,
 )
 
 __version__: str

@@ -12,7 +12,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pointmass.laws import functions as fn  # the same bits on every machine, unlike np.cos
+from pointmass.tracing import functions as fn  # the same bits on every machine, unlike np.cos
 
 Array = NDArray[np.float64]
 MULTIPLY = (np.uint64(0xD2511F53), np.uint64(0xCD9E8D57))

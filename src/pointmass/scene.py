@@ -19,7 +19,7 @@ from pointmass.collisions.collider import Collider
 from pointmass.description import Described
 from pointmass.emitters import EMITTERS
 from pointmass.emitters.emitter import Emitter
-from pointmass.errors import InvalidInput, number, shown, whole_number
+from pointmass.errors import InvalidInput, number, whole_number
 from pointmass.forces import FORCES, load_grid
 from pointmass.frame import Camera
 from pointmass.laws.force import Force
@@ -83,8 +83,6 @@ class Scene:
         self.fps = number("fps", self.fps, above=0, unit="1/s")
         self.frames = whole_number("frames", self.frames, at_least=1)
         self.seed = whole_number("seed", self.seed, at_least=0)
-        if self.seed >= 2**63:  # TOML holds no more
-            raise InvalidInput(f"seed = {shown(self.seed)} is not allowed: it must be below 2**63")
         if self.dtype not in ("float64", "float32"):
             raise InvalidInput(f"dtype = {self.dtype!r} is not allowed: it must be float64 or float32")
         for what, kind in HOLDS.items():

@@ -16,7 +16,8 @@ from pointmass.frame import Frame
 from pointmass.look import Look, Stage
 from pointmass.particles import Array
 from pointmass.solvers import as_solver
-from pointmass.solvers.base import Solver
+from pointmass.solvers.advance import advance
+from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.control import control_of
 from pointmass.system import ParticleSystem
 
@@ -197,7 +198,6 @@ class Simulation:
             self.system.remove(np.arange(old, len(self.system.particles)))
             raise explained from error
         except InvalidInput:  # a parameter that is no longer allowed
-            self.engine.memory = {}
             self.system.set_state(before, t0)
             self.system.remove(np.arange(old, len(self.system.particles)))
             raise
@@ -288,11 +288,10 @@ class Simulation:
     def _end_of(self, y: Array, pieces: int) -> Array:
         """State at the end of the step that began at `y`, if there were no colliders, made in pieces."""
         h = self.dt / pieces
-        memory = self.solver.start(self.system)
+        memory: Memory = {}
         for k in range(pieces):
-            with np.errstate(all="ignore"):
-                step = self.solver.step(self.system, self.t + k * h, y, h, memory)
-            y, memory = step.y1, step.memory
+            start = self.t + k * h
+            y, memory, _ = advance(self.system, self.solver, start, start + h, y, memory)
         return y
 
     def _explained(self, error: Diverged) -> Diverged:

@@ -149,7 +149,7 @@ class ParticleSystem:
         v = p.v if v is None else v
         if self.order == 1:
             return np.where(p.pinned[:, None], 0, p.f).ravel()
-        free = p.w[:, None] > 0
+        free = ~p.pinned[:, None]
         acceleration = np.where(free, p.f / p.m[:, None], 0)
         return np.concatenate([np.where(free, v, 0).ravel(), acceleration.ravel()])
 

@@ -27,11 +27,11 @@ from pointmass.forces import (
     Vortex,
     Wind,
 )
-from pointmass.laws import functions as fn
 from pointmass.laws.elements import spring_force
 from pointmass.laws.force import Blocks
 from pointmass.particles import Particles
 from pointmass.system import ParticleSystem
+from pointmass.tracing import functions as fn
 
 G = 9.81
 

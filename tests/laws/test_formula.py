@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from pointmass.errors import InvalidInput
 from pointmass.laws.formula import DEEPEST, FUNCTIONS, LONGEST, Formula
-from pointmass.laws.trace import trace
+from pointmass.tracing.trace import trace
 
 PYTHON = {
     "sin": math.sin,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from pointmass.errors import InvalidInput
-from pointmass.laws import functions as fn
 from pointmass.laws.parameter import Parameter
 from pointmass.particles import Particles
+from pointmass.tracing import functions as fn
 
 P = Particles(np.zeros((3, 3)), m=[1.0, 2.0, 3.0], radius=[0.1, 0.2, 0.3], charge=[5.0, 6.0, 7.0])
 ROWS = np.array([0, 2])

@@ -8,12 +8,12 @@ import pytest
 
 from pointmass.errors import InvalidInput
 from pointmass.forces import Angles, Drag, Field, Gravitation, Gravity, Magnetic, Springs, Vortex, Wind
-from pointmass.laws import functions as fn
 from pointmass.laws.arrays import ArrayForce, array_force
 from pointmass.laws.elements import element_force, spring_force
 from pointmass.laws.unary import unary_force, velocity_field
 from pointmass.particles import Particles
 from pointmass.system import ParticleSystem
+from pointmass.tracing import functions as fn
 
 X = np.array([[0.1, 0.2, 0.3], [1, 0, 0], [2, 1, 0], [3, 1, 1]], dtype=float)
 V = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], dtype=float)

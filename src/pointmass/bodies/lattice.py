@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pointmass.bodies.body import Body, body
 from pointmass.errors import InvalidInput, finite_array, number
 from pointmass.forces.springs import Springs
-from pointmass.laws import functions as fn
 from pointmass.particles import Particles
+from pointmass.tracing import functions as fn
 
 FAMILIES = {"stretch": 1, "shear": 2, "volume": 3}  # lattice steps between the ends: along an edge, a face, the body
 

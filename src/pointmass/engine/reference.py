@@ -19,7 +19,7 @@ from pointmass.collisions.contact import Contacts
 from pointmass.collisions.discrete import bounce
 from pointmass.collisions.response import respond
 from pointmass.collisions.swept import Paths, first_hit
-from pointmass.errors import Diverged
+from pointmass.errors import PointmassError
 from pointmass.particles import Array
 from pointmass.solvers.advance import Stats, advance
 from pointmass.solvers.base import Memory, Solver, Step
@@ -102,14 +102,15 @@ class ReferenceEngine:
             y, self.memory, stats = advance(
                 system, self.solver, t0, t1, system.get_state(), self.memory, clock=clock, **hooks
             )
-        except Diverged:
+        except PointmassError:
             self.memory = {}
             raise
         finally:
             system.filter = None
         self.stats = self.stats + stats
         system.set_state(y, t1)
-        self._left = self._touchable()
+        if self.memory:
+            self._left = self._touchable()
 
     def state_at(self, t: float) -> Array:
         """State of the present particles at a time within the last step, shape (dim,); nothing is changed.
@@ -150,11 +151,12 @@ class ReferenceEngine:
 
         An island in which somebody was moved, pushed or pinned from outside starts anew.
         """
+        if not self.memory:
+            return
         system = self.system
         ids, islands = system.particles.id, system.island_of_particle
         now_is = self._touchable()
-        same = self._ids is ids and self._islands is islands
-        if not self.memory or (same and np.array_equal(now_is, self._left)):
+        if self._ids is ids and self._islands is islands and np.array_equal(now_is, self._left):
             return
         then, now = _match(self._ids, ids)
         touched = islands[now[(now_is[:, now] != self._left[:, then]).any(axis=(0, 2))]]

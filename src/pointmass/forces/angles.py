@@ -6,9 +6,9 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from pointmass.laws import functions as fn
 from pointmass.laws.elements import ConstraintForce
 from pointmass.laws.parameter import Parameter, Scalar
+from pointmass.tracing import functions as fn
 
 
 class Angles(ConstraintForce):

@@ -7,13 +7,13 @@ from typing import Any
 
 from pointmass.errors import InvalidInput
 from pointmass.forces.grid_files import as_grid
-from pointmass.laws.derivative import gradient
 from pointmass.laws.field_source import FieldSource
 from pointmass.laws.grid import Grid
 from pointmass.laws.parameter import Scalar
-from pointmass.laws.trace import Traced, trace
 from pointmass.laws.unary import UnaryForce
 from pointmass.particles import Particles, Selection
+from pointmass.tracing.derivative import gradient
+from pointmass.tracing.trace import Traced, trace
 
 PLACE = ("x", "y", "z", "m", "t")
 MOTION = ("x", "y", "z", "vx", "vy", "vz", "m", "t")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from pointmass.laws import functions as fn
 from pointmass.laws.pairs import PairForce
 from pointmass.laws.parameter import Parameter, Scalar
 from pointmass.particles import Selection
+from pointmass.tracing import functions as fn
 
 
 class Gravitation(PairForce):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from pointmass.laws import functions as fn
 from pointmass.laws.parameter import Parameter, Vector
 from pointmass.laws.unary import UnaryForce
 from pointmass.particles import Selection
+from pointmass.tracing import functions as fn
 
 
 class Gravity(UnaryForce):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar
 
-from pointmass.laws import functions as fn
 from pointmass.laws.pairs import PairForce
 from pointmass.laws.parameter import Parameter, Scalar
 from pointmass.particles import Selection
+from pointmass.tracing import functions as fn
 
 
 class PointVortices(PairForce):

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pointmass.errors import InvalidInput, shown
-from pointmass.laws import functions as fn
 from pointmass.laws.elements import ConstraintForce
 from pointmass.laws.parameter import Parameter, Scalar
 from pointmass.particles import Particles
+from pointmass.tracing import functions as fn
 
 
 class Springs(ConstraintForce):

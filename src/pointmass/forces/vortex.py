@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 from pointmass.errors import InvalidInput
-from pointmass.laws import functions as fn
 from pointmass.laws.parameter import Parameter, Scalar, Vector
 from pointmass.laws.unary import VelocityField
 from pointmass.particles import Selection
+from pointmass.tracing import functions as fn
 
 
 class Vortex(VelocityField):

@@ -6,10 +6,10 @@ from copy import copy
 from typing import Any
 
 from pointmass.errors import InvalidInput
-from pointmass.laws import functions as fn
 from pointmass.laws.parameter import Parameter, Scalar, Vector
 from pointmass.laws.unary import UnaryForce, VelocityField
 from pointmass.particles import Particles, Selection
+from pointmass.tracing import functions as fn
 
 
 class Wind(UnaryForce):

@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pointmass.errors import InvalidInput, whole_number
-from pointmass.laws import functions as fn
-from pointmass.laws.derivative import gradient
 from pointmass.laws.force import Array, Blocks, Force, Rows, clock, inputs_for, matrix
 from pointmass.laws.parameter import Parameter
-from pointmass.laws.program import flatten
-from pointmass.laws.trace import Traced, trace, vector_names
 from pointmass.laws.unary import law_name, law_parameters, origin, parameters_from
 from pointmass.particles import Particles
+from pointmass.tracing import functions as fn
+from pointmass.tracing.derivative import gradient
+from pointmass.tracing.program import flatten
+from pointmass.tracing.trace import Traced, trace, vector_names
 
 
 class ElementForce(Force):

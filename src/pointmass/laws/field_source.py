@@ -11,8 +11,8 @@ from pointmass.errors import InvalidInput, number, shown
 from pointmass.laws.formula import CONSTANTS, FUNCTIONS, Formula
 from pointmass.laws.grid import Grid
 from pointmass.laws.parameter import Parameter, Scalar
-from pointmass.laws.program import Symbol
 from pointmass.particles import Particles
+from pointmass.tracing.program import Symbol
 
 
 class FieldSource:

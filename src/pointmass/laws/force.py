@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.description import Described
-from pointmass.errors import InvalidInput
+from pointmass.errors import InvalidInput, about
 from pointmass.laws.parameter import Parameter
-from pointmass.laws.trace import Traced, vector_names
 from pointmass.particles import Particles, Selection
+from pointmass.tracing.trace import Traced, vector_names
 
 Array = NDArray[np.floating[Any]]
 Rows = NDArray[np.intp]
@@ -102,10 +102,8 @@ class Force(Described, ABC):
         InvalidInput
             A parameter has a value at time t that is not allowed.
         """
-        try:
+        with about(self.called):
             return {p.name: p.of(particles, t, rows) for p in self.parameters.values()}
-        except InvalidInput as error:
-            raise InvalidInput(f"{self.called}: {error}") from None
 
     def set(self, **values: Any) -> None:
         """Replace parameters; the values are checked like those of the constructor, and nothing is traced again.

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from pointmass.errors import InvalidInput, unknown
-from pointmass.laws import functions as fn
-from pointmass.laws.program import Symbol
+from pointmass.tracing import functions as fn
+from pointmass.tracing.program import Symbol
 
 FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
     "sin": (fn.sin, 1),

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pointmass.description import Described
 from pointmass.errors import InvalidInput, finite_array, floats
-from pointmass.laws.program import Primitive
+from pointmass.tracing.program import Primitive
 
 Outside = Literal["zero", "clamp", "wrap"]
 Array = NDArray[np.floating[Any]]

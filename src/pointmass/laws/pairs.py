@@ -10,8 +10,8 @@ import numpy as np
 
 from pointmass.errors import InvalidInput
 from pointmass.laws.force import Array, Blocks, Force, Rows, clock, inputs_for, matrix
-from pointmass.laws.trace import Traced, trace, vector_names
 from pointmass.particles import Particles
+from pointmass.tracing.trace import Traced, trace, vector_names
 
 PAIRS_AT_ONCE = 2**18  # a block of columns of this many pairs stays in the cache
 LARGEST_JACOBIAN = 1500  # particles; a dense Jacobian has 18 n^2 numbers

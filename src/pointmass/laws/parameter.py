@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from pointmass.errors import InvalidInput, finite_array, floats, number, shown
 from pointmass.laws.formula import Formula
-from pointmass.laws.program import flatten
-from pointmass.laws.trace import Traced, trace
 from pointmass.particles import Particles
+from pointmass.tracing.program import flatten
+from pointmass.tracing.trace import Traced, trace
 
 Scalar = float | str | Callable[[Any], Any] | Sequence[float] | NDArray[np.floating[Any]]
 Vector = Sequence[Any] | Callable[[Any], Any] | NDArray[np.floating[Any]]

@@ -12,8 +12,8 @@ import numpy as np
 from pointmass.errors import InvalidInput
 from pointmass.laws.force import Array, Blocks, Force, clock, inputs_for, matrix
 from pointmass.laws.parameter import Parameter
-from pointmass.laws.trace import Traced, trace
 from pointmass.particles import Particles, Selection
+from pointmass.tracing.trace import Traced, trace
 
 STATE = ("x_x", "x_y", "x_z", "v_x", "v_y", "v_z")
 

@@ -11,11 +11,11 @@ import numpy as np
 from pointmass.bodies import Body, points
 from pointmass.forces import Attractor, Gravitation
 from pointmass.frame import Camera, Frame
-from pointmass.laws import functions as fn
 from pointmass.look import Look
 from pointmass.scene import Scene
 from pointmass.scenes.base import ShippedScene, expect, knob
 from pointmass.solvers import Leapfrog
+from pointmass.tracing import functions as fn
 
 EIGHT_PERIOD = 6.32591398  # Chenciner & Montgomery (2000), with the digits of C. Simo
 EIGHT_X = (0.97000435669734, -0.24308753153583)

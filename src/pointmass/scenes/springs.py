@@ -12,11 +12,11 @@ from pointmass.bodies import lattice
 from pointmass.collisions import Plane
 from pointmass.forces import Drag, Gravity
 from pointmass.frame import Camera, Frame
-from pointmass.laws import functions as fn
 from pointmass.look import Look
 from pointmass.scene import Scene
 from pointmass.scenes.base import ShippedScene, expect, knob, substeps
 from pointmass.solvers import SymplecticEuler
+from pointmass.tracing import functions as fn
 
 LIVELY = 0.5  # a floor that gives more than this back
 

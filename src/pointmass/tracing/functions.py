@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pointmass.errors import InvalidInput
-from pointmass.laws.program import Symbol, Vector, power, three, whole_power
+from pointmass.tracing.program import Symbol, Vector, power, three, whole_power
 
 Number = Any  # a float, an array or a Symbol
 Triple = tuple[Number, ...]  # a Vector, or any three numbers
@@ -46,7 +46,7 @@ def operation(name: str, *arguments: Number) -> Number:
     if name in NUMPY:
         with np.errstate(all="ignore"):
             return np.asarray(NUMPY[name](*arguments))[()]
-    from pointmass.laws.columns import elementary
+    from pointmass.tracing.columns import elementary
 
     return elementary(name)(*arguments)[0]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from pointmass.laws import functions as fn
-from pointmass.laws.program import Program, Symbol, operands
+from pointmass.tracing import functions as fn
+from pointmass.tracing.program import Program, Symbol, operands
 
 Rule = Callable[..., Any]  # (result, *operands, *their derivatives) -> derivative of the result
 

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
-from pointmass.errors import InvalidInput
-from pointmass.laws.columns import columns
-from pointmass.laws.derivative import jacobian
-from pointmass.laws.program import Program, Symbol, Vector, flatten
+from pointmass.errors import InvalidInput, about
+from pointmass.tracing.columns import columns
+from pointmass.tracing.derivative import jacobian
+from pointmass.tracing.program import Program, Symbol, Vector, flatten
 
 AXES = "xyz"
 
@@ -95,12 +95,8 @@ def trace(
             f"law {name!r} must return {returns} number{'s' * (returns > 1)}, but returned {len(numbers)}"
         )
     anchor = Symbol(program, program.constant(0.0))
-    try:
+    with about(f"law {name!r} must return numbers"):
         program.outputs = [program.number(anchor.lift(n)) for n in numbers]
-    except InvalidInput as error:
-        raise InvalidInput(f"law {name!r} must return numbers: {error}") from error
-    try:
+    with about(f"law {name!r}"):
         program.check()
-    except InvalidInput as error:
-        raise InvalidInput(f"law {name!r}: {error}") from error
     return Traced(name, tuple(inputs), program)

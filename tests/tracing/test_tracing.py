@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from pointmass.errors import InvalidInput
-from pointmass.laws import functions as fn
-from pointmass.laws.columns import columns, source
-from pointmass.laws.derivative import RULES, gradient
-from pointmass.laws.program import Program, Symbol
-from pointmass.laws.trace import trace
+from pointmass.tracing import functions as fn
+from pointmass.tracing.columns import columns, source
+from pointmass.tracing.derivative import RULES, gradient
+from pointmass.tracing.program import Program, Symbol
+from pointmass.tracing.trace import trace
 
 A = np.array([-2.3, -1.0, -0.4, 0.0, 0.3, 1.0, 1.7, 2.9])
 B = np.array([1.3, -0.8, 0.6, 2.0, -1.1, 0.9, 3.0, -2.0])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pointmass.laws import functions as fn
-from pointmass.laws.trace import trace
+from pointmass.tracing import functions as fn
+from pointmass.tracing.trace import trace
 
 RNG = np.random.default_rng(3)
 ANGLES = np.concatenate([RNG.uniform(-10, 10, 4000), RNG.uniform(-1e5, 1e5, 2000), np.arange(-20, 21) * np.pi / 4])

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from pointmass.laws.elementary import EXPANSIONS
-from pointmass.laws.functions import NUMPY
-from pointmass.laws.program import Program, Symbol, operands
+from pointmass.tracing.elementary import EXPANSIONS
+from pointmass.tracing.functions import NUMPY
+from pointmass.tracing.program import Program, Symbol, operands
 
 INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "and": "&", "or": "|"}
 FLOATS = (np.dtype(np.float64), np.dtype(np.float32))

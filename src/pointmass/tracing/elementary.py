@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from pointmass.laws.functions import Number, absolute, floor, maximum, minimum, operation, where
+from pointmass.tracing.functions import Number, absolute, floor, maximum, minimum, operation, where
 
 # pi/2 in four parts whose products with a whole number are exact, in float32 as in float64 (Cody & Waite 1980)
 HALF_PI = (1.5703125, 0.0004837512969970703, 7.549533620476723e-08, 2.563344151594519e-12)
