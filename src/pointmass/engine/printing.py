@@ -1,0 +1,75 @@
+"""Prints a program as scalar, typed statements: what compiled kernels are made of.
+
+The same operations in the same order as the NumPy columns, so that float64 gives the same bits. Conditions become
+selects, which vectorise; literals carry the precision of the kernel, so that none turns a float32 loop into double.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pointmass.tracing.columns import INFIX
+from pointmass.tracing.program import Program, operands
+
+CALLS = {
+    "sqrt": "np.sqrt({0})",
+    "abs": "abs({0})",
+    "floor": "np.floor({0})",
+    "neg": "-{0}",
+    "not": "not {0}",
+    "where": "({1} if {0} else {2})",
+    "min": "({0} if {0} < {1} or {0} != {0} else {1})",  # as np.minimum: NaN wins
+    "max": "({0} if {0} > {1} or {0} != {0} else {1})",
+    "and": "({0} and {1})",
+    "or": "({0} or {1})",
+    "ldexp": "scaled({0}, {1})",
+    "significand": "significand({0})",
+    "exponent": "exponent({0})",
+}
+
+
+def literal(value: float, dtype: str) -> str:
+    """A number as the source of a constant of a precision."""
+    text = {"inf": "np.inf", "-inf": "-np.inf", "nan": "np.nan"}.get(repr(float(value)), repr(float(value)))
+    if dtype == "float32":
+        return f"np.float32({text})"
+    return f"({text})" if text.startswith("-") else text
+
+
+def statements(program: Program, names: Mapping[str, str], prefix: str, dtype: str) -> tuple[list[str], list[str]]:
+    """A program as assignments to local variables, and the expressions of its outputs.
+
+    Parameters
+    ----------
+    program : without elementary functions (`tracing.columns.expanded`).
+    names : expression in the kernel of each input.
+    prefix : of the local variables, which keeps several laws in one kernel apart.
+    dtype : "float64" or "float32", the precision of every operation.
+    """
+    text: dict[int, str] = {}
+    lines = []
+    for i in program.live():
+        op, *rest = node = program.nodes[i]
+        if op == "const":
+            text[i] = literal(rest[0], dtype)
+        elif op == "arg":
+            text[i] = names[rest[0]]
+        else:
+            text[i] = f"{prefix}{i}"
+            lines.append(f"{text[i]} = {_right(node, [text[o] for o in operands(node)])}")
+    return lines, [text[o] for o in program.outputs]
+
+
+def _right(node: tuple[Any, ...], parts: list[str]) -> str:
+    op = node[0]
+    if op == "call":
+        return str(node[1].scalar(parts))
+    if op in CALLS:
+        return CALLS[op].format(*parts)
+    return f"{parts[0]} {INFIX[op]} {parts[1]}"
+
+
+def indented(lines: list[str], depth: int) -> list[str]:
+    """Lines at a depth of blocks."""
+    return [f"{'    ' * depth}{line}" if line else line for line in lines]

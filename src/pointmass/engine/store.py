@@ -1,0 +1,159 @@
+"""Kernels on disk: the printed source of a kernel is a file of the user's cache folder, and its machine code lies beside it.
+
+A file is named by the hash of all that its code depends on, so it never changes: what is there is right. Numba keeps the
+machine code in `__pycache__` beside the file, and every later process loads it. The file is plain Python that anybody may
+read.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import tempfile
+import threading
+import warnings
+from collections.abc import Iterator
+from functools import cache
+from hashlib import sha256
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+HEADER = '''"""{title}
+
+Printed by pointmass {version} for {dtype}. It runs without Numba too: delete the lines `@njit`.
+"""
+
+import numpy as np
+from numba import njit, prange
+
+from pointmass.engine.support import exponent, scaled, significand
+
+R = np.{dtype}
+FLAGS = {{"error_model": "numpy", "cache": True, "nogil": True{fast}}}
+
+'''
+FAST = ', "fastmath": {"contract", "arcp"}'  # never those that assume that there is no NaN, or reorder sums
+LOADED: dict[str, ModuleType] = {}
+LOCK = threading.RLock()
+
+
+def folder() -> Path:
+    """Where kernels are kept: $POINTMASS_CACHE, or `pointmass` in the user's cache folder."""
+    from platformdirs import user_cache_path
+
+    given = os.environ.get("POINTMASS_CACHE")
+    return (Path(given) if given else user_cache_path("pointmass", appauthor=False)) / "kernels"
+
+
+def complete(title: str, text: str, dtype: str) -> str:
+    """The text of functions as a whole module."""
+    from pointmass import __version__
+
+    head = HEADER.format(title=title, version=__version__, dtype=dtype, fast=FAST if dtype == "float32" else "")
+    return head + text
+
+
+def load(title: str, text: str, dtype: str) -> ModuleType:
+    """The module of a kernel, compiled when it is first called, or loaded from the machine code of another process.
+
+    Parameters
+    ----------
+    title : one line that says what it is.
+    text : functions, with the names that the header provides: np, njit, prange, R, FLAGS.
+    dtype : "float64" or "float32".
+    """
+    source = complete(title, text, dtype)
+    key = sha256((source + _surroundings()).encode()).hexdigest()[:20]
+    with LOCK:
+        if key not in LOADED:
+            LOADED[key] = _import(f"pointmass_kernel_{key}", _written(key, source))
+        return LOADED[key]
+
+
+def plain(title: str, text: str, dtype: str) -> dict[str, Any]:
+    """The functions of a kernel as plain Python, by name: what tests run to see every line."""
+    source = complete(title, text, dtype).replace("from numba import njit, prange\n", "")
+    scope: dict[str, Any] = {"njit": lambda **flags: lambda function: function, "prange": range}
+    exec(compile(source, f"<{title}>", "exec"), scope)
+    return scope
+
+
+def kept() -> Iterator[Path]:
+    """Every file of the store, kernels with their machine code."""
+    if folder().is_dir():
+        yield from (path for path in sorted(folder().rglob("*")) if path.is_file())
+
+
+def clear() -> tuple[int, int]:
+    """Delete all kernels; how many there were, and how many bytes."""
+    kernels = size = 0
+    for path in kept():
+        size += path.stat().st_size
+        kernels += path.suffix == ".py"
+        path.unlink(missing_ok=True)
+    return kernels, size
+
+
+@cache
+def _surroundings() -> str:
+    """What the machine code depends on besides its source; Numba itself looks at the CPU."""
+    import llvmlite
+    import numba
+    import numpy as np
+
+    support = Path(__file__).with_name("support.py").read_text(encoding="utf-8")
+    return repr((numba.__version__, llvmlite.__version__, np.__version__, sys.version, sys.platform, support))
+
+
+def _written(key: str, source: str) -> Path:
+    """The file of a kernel. The first process that writes it wins: its time stamp is part of Numba's key."""
+    path = folder() / f"{key}.py"
+    try:
+        if not path.exists():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            _publish(path, source)
+    except OSError as error:
+        warnings.warn(
+            f"kernels cannot be kept in {str(folder())!r} ({error.strerror}), so they are compiled in every process: "
+            "set POINTMASS_CACHE to a folder that can be written",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        path = Path(tempfile.mkdtemp(prefix="pointmass-")) / f"{key}.py"
+        path.write_text(source, encoding="utf-8")
+    return path
+
+
+def _publish(path: Path, source: str) -> None:
+    """Write beside, and rename unless somebody else was first."""
+    handle, beside = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".new")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(source)
+        try:
+            os.link(beside, path)
+        except FileExistsError:
+            return
+        except OSError:  # a file system without links
+            os.replace(beside, path)
+            return
+    finally:
+        Path(beside).unlink(missing_ok=True)
+
+
+def _import(name: str, path: Path) -> ModuleType:
+    spec = spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    sys.modules[name] = module  # Numba looks functions up by the name of their module
+    spec.loader.exec_module(module)
+    return module
+
+
+def is_kernel(module: str) -> bool:
+    """Whether a module is one of ours: for those who say that it is being compiled."""
+    return re.fullmatch(r"pointmass_kernel_[0-9a-f]{20}", module) is not None

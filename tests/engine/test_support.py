@@ -1,0 +1,40 @@
+"""Bit operations of printed kernels against NumPy's, compiled and plain."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import pytest
+
+from pointmass.engine.support import exponent, scaled, significand
+
+
+@numba.njit(error_model="numpy")
+def apply(a, k, result):
+    for i in range(a.size):
+        result[0, i] = scaled(a[i], k[i])
+        result[1, i] = significand(a[i])
+        result[2, i] = exponent(a[i])
+
+
+def numbers(dtype: type) -> np.ndarray:
+    rng = np.random.default_rng(1)
+    with np.errstate(over="ignore"):
+        spread = np.exp(rng.uniform(-740, 700, 3000)).astype(dtype) * rng.choice([-1, 1], 3000).astype(dtype)
+    return np.concatenate([spread, np.array([0.0, -0.0, 1.0, 2.0, 0.75, np.inf, -np.inf, np.nan], dtype)])
+
+
+@pytest.mark.filterwarnings("ignore:.*encountered.*:RuntimeWarning")
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("run", [apply, apply.py_func], ids=["compiled", "plain"])
+def test_as_numpy(run, dtype):
+    a = numbers(dtype)
+    near = np.random.default_rng(2).uniform(0.5, 2, len(a)).astype(dtype)
+    k = np.floor(np.random.default_rng(3).uniform(-1100, 1030, len(a))).astype(dtype)
+    result = np.zeros((3, len(a)), dtype)
+    run(near, k, result)
+    assert np.array_equal(result[0], np.ldexp(near, k.astype(np.int32)))
+    run(a, np.zeros_like(a), result)
+    f, e = np.frexp(a)
+    assert np.array_equal(result[1], f, equal_nan=True)
+    assert np.array_equal(result[2][np.isfinite(a)], e[np.isfinite(a)])
