@@ -150,7 +150,7 @@ class ParticleSystem:
         if self.order == 1:
             return np.where(p.pinned[:, None], 0, p.f).ravel()
         free = ~p.pinned[:, None]
-        acceleration = np.where(free, p.f / p.m[:, None], 0)
+        acceleration = np.where(free, p.f * p.w[:, None], 0)
         return np.concatenate([np.where(free, v, 0).ravel(), acceleration.ravel()])
 
     # ---------------------------------------------------------------------------------------- more that solvers may ask

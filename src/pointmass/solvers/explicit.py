@@ -85,7 +85,8 @@ class ExplicitRungeKutta(Solver):
         length = np.asarray(h, y.dtype)
         slopes: list[Array] = []
         for c, a in self._stages:
-            slopes.append(system.deriv_eval(t + c * h, y + length * weighted(a, slopes)))
+            stage = y + length * weighted(a, slopes) if slopes else y
+            slopes.append(system.deriv_eval(t + c * h, stage))
         return slopes
 
     def _error(self, h: Array, slopes: list[Array], end: Callable[[], Array]) -> Array | None:

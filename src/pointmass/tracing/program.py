@@ -46,6 +46,9 @@ BRANCH = (
     "pm.minimum and pm.maximum"
 )
 JUNCTIONS = {"and", "or", "not"}  # and whose operands are
+COMMUTATIVE = {"add", "mul"}
+SIGNS = {"add", "sub", "mul", "div", "neg"}
+EXACT = {0.25, 0.5, 2.0, 4.0}  # products of these and a number are not rounded
 
 
 @dataclass(eq=False)
@@ -74,6 +77,8 @@ class Program:
             self.condition(o) if name in JUNCTIONS or (name == "where" and k == 0) else self.number(o)
             for k, o in enumerate(operands)
         )
+        if name in COMMUTATIVE:
+            operands = tuple(sorted(operands))
         simple = self._simplified(name, operands)
         return self._store((name, *operands)) if simple is None else simple
 
@@ -158,6 +163,49 @@ class Program:
             return nodes[0]
         if name == "sub" and values[0] == 0.0:
             return self.operation("neg", nodes[1])
+        return self._without_signs(name, nodes) if name in SIGNS else self._doubled(name, nodes, values)
+
+    def _without_signs(self, name: str, nodes: Sequence[int]) -> int | None:
+        """Signs pulled out of products and into differences: exact, and what derivatives leave behind."""
+        plain = [self._negated(n) for n in nodes]
+        if name == "sub" and ("sub", nodes[1], nodes[0]) in self._known:
+            return self.operation("neg", self._known["sub", nodes[1], nodes[0]])
+        if name == "neg" or all(p is None for p in plain):
+            return plain[0] if name == "neg" else self._doubled(name, nodes, [self.value(n) for n in nodes])
+        bare = [n if p is None else p for n, p in zip(nodes, plain, strict=True)]
+        both = None not in plain
+        match name:
+            case "mul" | "div":
+                product = self.operation(name, *bare)
+                return product if both else self.operation("neg", product)
+            case "add":
+                if both:
+                    return self.operation("neg", self.operation("add", *bare))
+                return self.operation("sub", *(bare if plain[0] is None else reversed(bare)))
+            case _:
+                if both:
+                    return self.operation("sub", *reversed(bare))
+                total = self.operation("add", *bare)
+                return total if plain[0] is None else self.operation("neg", total)
+
+    def _negated(self, node: int) -> int | None:
+        """The node whose negative this one is."""
+        op, *rest = self.nodes[node]
+        return rest[0] if op == "neg" else None
+
+    def _doubled(self, name: str, nodes: Sequence[int], values: Sequence[float | None]) -> int | None:
+        """Products with -1 and powers of 2, exact as well."""
+        if name == "add" and nodes[0] == nodes[1]:
+            return self.operation("mul", self.constant(2.0), nodes[0])
+        if name == "mul" and -1.0 in values:
+            return self.operation("neg", nodes[1 - values.index(-1.0)])
+        if name == "mul" and any(v is not None for v in values):
+            known = 0 if values[0] is not None else 1
+            op, *rest = self.nodes[nodes[1 - known]]
+            inner = [self.value(r) for r in rest] if op == "mul" else []
+            for k, value in enumerate(inner):
+                if value in EXACT and values[known] in EXACT:
+                    return self.operation("mul", self.constant(float(value) * float(values[known])), rest[1 - k])  # type: ignore[arg-type]
         return None
 
 

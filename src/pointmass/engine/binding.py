@@ -1,0 +1,202 @@
+"""What a kernel reads besides the state: the numbers and columns of the laws, found anew whenever it is launched.
+
+Which parameters are numbers, columns or functions of time is compiled; their values are data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.engine.printing import statements
+from pointmass.laws.force import Force
+from pointmass.laws.parameter import Component, Parameter
+from pointmass.particles import Particles
+from pointmass.tracing.columns import expanded
+from pointmass.tracing.trace import Traced, vector_names
+
+Array = NDArray[np.floating[Any]]
+OUT_OF_BOUNDS = 2  # status of an island: a function of time is not allowed at some time
+
+
+@dataclass
+class Table:
+    """Columns of one length, the rows of an array in the kernel.
+
+    Attributes
+    ----------
+    name : of the array.
+    getters : give each row anew, shape (length,).
+    """
+
+    name: str
+    getters: list[Callable[[], Array]] = field(default_factory=list)
+    _known: dict[str, int] = field(default_factory=dict)
+
+    def column(self, key: str, get: Callable[[], Array]) -> int:
+        """The number of the row of a column; one with a key that is known is shared."""
+        if key not in self._known:
+            self._known[key] = len(self.getters)
+            self.getters.append(get)
+        return self._known[key]
+
+    def array(self, length: int, dtype: Any, order: NDArray[np.intp] | None) -> Array:
+        """All columns now, in the order of the kernel's rows."""
+        result = np.empty((len(self.getters), length), dtype)
+        for row, get in zip(result, self.getters, strict=True):
+            values = get()
+            row[:] = values if order is None else values[order]
+        return result
+
+
+@dataclass
+class Numbers:
+    """Numbers that all rows share: the entries of one array in the kernel, read into locals p0, p1, ..."""
+
+    getters: list[Callable[[], float]] = field(default_factory=list)
+
+    def number(self, get: Callable[[], float]) -> str:
+        """The local that holds a number."""
+        self.getters.append(get)
+        return f"p{len(self.getters) - 1}"
+
+    def array(self) -> NDArray[np.float64]:
+        """All numbers now."""
+        return np.array([get() for get in self.getters], np.float64)
+
+    def lines(self) -> list[str]:
+        """Statements that read them."""
+        return [f"p{k} = R(P[{k}])" for k in range(len(self.getters))]
+
+
+@dataclass(frozen=True)
+class Text:
+    """How a kernel evaluates a law for one particle or element.
+
+    Attributes
+    ----------
+    at_time : statements that need only the time `t`, in float64.
+    lines : statements for one item.
+    outputs : expressions.
+    """
+
+    at_time: list[str]
+    lines: list[str]
+    outputs: list[str]
+
+
+class Binder:
+    """Binds the inputs of laws to expressions of a kernel.
+
+    Parameters
+    ----------
+    dtype : "float64" or "float32".
+    """
+
+    def __init__(self, particles: Particles) -> None:
+        self.particles = particles
+        self.dtype = str(particles.dtype)
+        self.numbers = Numbers()
+        self.particle = Table("C")
+
+    def attribute(self, name: str, index: str) -> str:
+        """A column of the particles."""
+        if name == "w":
+            return f"C[{self.particle.column('w', lambda: self.particles.w)}, {index}]"
+        return f"C[{self.particle.column(name, lambda: self.particles.column(name))}, {index}]"
+
+    def law(self, traced: Traced, force: Force, state: Mapping[str, str], index: str, table: Table, tag: str) -> Text:
+        """A law of a force.
+
+        Parameters
+        ----------
+        traced : the law, or a derivative of it, of the same inputs.
+        state : expression of each input that is no parameter.
+        index : of the item in its table.
+        table : where columns of parameters go.
+        tag : keeps its locals apart.
+        """
+        program = expanded(traced.program)
+        needed = program.arguments()
+        names, at_time, lines = dict(state), [], []
+        for parameter in force.parameters.values():
+            for name, expression, timed, own in self._parameter(force, parameter, needed, index, table, tag):
+                names[name] = expression
+                at_time += timed
+                lines += own
+        body, outputs = statements(program, names, f"{tag}_", self.dtype)
+        return Text(at_time, lines + body, outputs)
+
+    def selected(self, force: Force, index: str) -> str:
+        """The condition under which a force acts on a row."""
+        switch = self.numbers.number(lambda: float(force.enabled))
+        if force.on is None:
+            return f"{switch} != 0"
+        column = self.particle.column(f"on {id(force)}", lambda: self._mask(force))
+        return f"({switch} != 0 and C[{column}, {index}] != 0)"
+
+    def _mask(self, force: Force) -> Array:
+        mask = np.zeros(len(self.particles), self.particles.dtype)
+        mask[self.particles.select(force.on)] = 1
+        return mask
+
+    def _parameter(
+        self, force: Force, parameter: Parameter, needed: set[str], index: str, table: Table, tag: str
+    ) -> list[tuple[str, str, list[str], list[str]]]:
+        """(input, expression, statements of the time, statements of the item) of each component that is needed."""
+        found = []
+        inputs = vector_names(parameter.name) if parameter.vector else (parameter.name,)
+        for axis, (name, component) in enumerate(zip(inputs, parameter.components, strict=True)):
+            if name in needed:
+                get = _getter(force, parameter.name, axis)
+                found.append((name, *self._component(component, get, name, index, table, tag)))
+        return found
+
+    def _component(
+        self, component: Component, get: Callable[[], Component], name: str, index: str, table: Table, tag: str
+    ) -> tuple[str, list[str], list[str]]:
+        value = component.value
+        if isinstance(value, float):
+            return self.numbers.number(lambda: float(get().value)), [], []  # type: ignore[arg-type]
+        if isinstance(value, np.ndarray):
+            column = table.column(f"{tag} {name}", lambda: get().value)  # type: ignore[arg-type, return-value]
+            return f"{table.name}[{column}, {index}]", [], []
+        program = expanded(value.program)
+        prefix = f"{tag}_{name}_"
+        if not component.needs:
+            lines, (result,) = statements(program, {"t": "t"}, prefix, "float64")
+            bounds = _bounds(component, f"{prefix}q")
+            return f"{prefix}r", [*lines, f"{prefix}q = {result}", f"{prefix}r = R({prefix}q)", *bounds], []
+        names = {n: self.attribute(n, index) for n in component.needs} | {"t": "R(t)"}
+        lines, (result,) = statements(program, names, prefix, self.dtype)
+        return result, [], lines
+
+
+def kinds(forces: list[Force]) -> tuple[Any, ...]:
+    """What of the forces is compiled: another value needs another kernel."""
+    return tuple(
+        (id(f), f.on is None, *(id(c.value) if isinstance(c.value, Traced) else type(c.value) for c in _components(f)))
+        for f in forces
+    )
+
+
+def _components(force: Force) -> list[Component]:
+    return [c for p in force.parameters.values() for c in p.components]
+
+
+def _getter(force: Force, name: str, axis: int) -> Callable[[], Component]:
+    return lambda: force.parameters[name].components[axis]
+
+
+def _bounds(component: Component, value: str) -> list[str]:
+    """Statements that note when a function of time is not allowed, as `errors.number` would say."""
+    if component.bounds is None:
+        return []
+    tests = [f"not abs({value}) < np.inf"]
+    signs = {"above": "> {0}", "at_least": ">= {0}", "at_most": "<= {0}", "below": "< {0}"}
+    tests += [f"not {value} {signs[name].format(repr(float(limit)))}" for name, limit in component.bounds.items()]
+    return [f"if {' or '.join(tests)}:", f"    status = {OUT_OF_BOUNDS}"]

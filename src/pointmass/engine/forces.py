@@ -1,0 +1,205 @@
+"""Prints `deriv`: the accelerations of an island (order 1: its velocities), the lecture's clear, calculate and gather.
+
+Elements are evaluated once each, into a buffer; then every particle adds up what acts on it, force by force in listed
+order and element by element: nothing is scattered, so the bits depend on no thread.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.engine.binding import Binder, Table, Text
+from pointmass.engine.printing import indented
+from pointmass.laws.elements import ElementForce
+from pointmass.laws.unary import UnaryForce
+from pointmass.system import ParticleSystem
+from pointmass.tracing.trace import vector_names
+
+
+@dataclass
+class Elements:
+    """A family of elements in the kernel.
+
+    Attributes
+    ----------
+    number : of the family; the arrays of the kernel are named after it: E (nodes), D (columns), J and I (incidence), B
+        (buffer of forces), and s, e (its range in the island).
+    """
+
+    force: ElementForce
+    number: int
+    table: Table
+
+    @property
+    def arguments(self) -> list[str]:
+        """Arrays of the kernel."""
+        j = self.number
+        return [f"E{j}", f"D{j}", f"J{j}", f"I{j}"]
+
+    @property
+    def locals(self) -> list[str]:
+        """What a call for one island takes besides: buffer and range."""
+        j = self.number
+        return [f"B{j}", f"s{j}", f"e{j}"]
+
+
+class Deriv:
+    """The text of `deriv` for a system.
+
+    Attributes
+    ----------
+    text : the function.
+    families : of elements, in the order of the forces.
+    arguments : arrays that it takes besides state and result.
+    """
+
+    def __init__(self, system: ParticleSystem, parallel: bool) -> None:
+        self.system = system
+        self.order = system.order
+        self.binder = Binder(system.particles)
+        self.binder.attribute("w", "g")  # the first column
+        self.families: list[Elements] = []
+        self.loop = "prange" if parallel else "range"
+        self.flags = "parallel=True, **FLAGS" if parallel else "**FLAGS"
+        self._at_time: list[str] = []
+        self.text = self._printed()
+
+    @property
+    def data(self) -> list[str]:
+        """Names of the arrays of a kernel that are the same for all islands."""
+        return ["P", "C", *(a for family in self.families for a in family.arguments)]
+
+    @property
+    def call(self) -> str:
+        """The arguments of a call that all islands' calls share, as text."""
+        return ", ".join(["base", "n", *self.data, *(a for f in self.families for a in f.locals)])
+
+    def _printed(self) -> str:
+        elements, sums = [], []
+        for k, force in enumerate(self.system.forces):
+            if isinstance(force, UnaryForce):
+                sums += self.unary(force, f"f{k}", UNARY, "g")
+            elif isinstance(force, ElementForce):
+                evaluate, gather = self._elements(force, f"f{k}")
+                elements += evaluate
+                sums += gather
+        w = self.binder.attribute("w", "g")
+        last = [f"k[o{a}] = f_{a} * w if free else R(0)" for a in "xyz"]
+        if self.order == 1:
+            last = [f"k[o{a}] = f_{a} if free else R(0)" for a in "xyz"]
+        particle = [
+            "g = base + i",
+            "o_x = np.uintp(3 * i)",
+            "o_y = np.uintp(3 * i + 1)",
+            "o_z = np.uintp(3 * i + 2)",
+            *(f"f_{a} = R(0)" for a in "xyz"),
+            *sums,
+            f"w = {w}",
+            "free = w != 0",
+            *(line.replace("[o", "[o_") for line in last),
+        ]
+        lines = [
+            f"@njit({self.flags})",
+            f"def deriv({self.call}, t, x, v, k):",
+            *indented(self.binder.numbers.lines(), 1),
+            "    status = 0",
+            *indented(self._at_time, 1),
+            *indented(elements, 1),
+            f"    for i in {self.loop}(n):",
+            *indented(particle, 2),
+            "    return status",
+            "",
+        ]
+        return "\n".join(lines)
+
+    def unary(self, force: UnaryForce, tag: str, state: dict[str, str], index: str) -> list[str]:
+        """Statements that add a force on one particle to f_x, f_y, f_z."""
+        names = state | {"m": self.binder.attribute("m", index) if "m" in force.traced.depends_on else "", "t": "R(t)"}
+        text = self.binder.law(force.traced, force, names, index, self.binder.particle, tag)
+        self._at_time += text.at_time
+        acts = self.binder.selected(force, index)
+        adds = [
+            f"f_{a} = f_{a} + ({out} if {acts} else R(0))"
+            for a, out in zip("xyz", text.outputs, strict=True)
+            if out not in ("0.0", "np.float32(0.0)")
+        ]
+        return [f"# {force.name}", *text.lines, *adds]
+
+    def _elements(self, force: ElementForce, tag: str) -> tuple[list[str], list[str]]:
+        """Statements that evaluate elements into their buffer, and those that add them up on a particle."""
+        j, nodes = len(self.families), force.nodes
+        table = Table(f"D{j}")
+        self.families.append(Elements(force, j, table))
+        state = {"t": "R(t)"}
+        for a in range(nodes):
+            for q in "xv":
+                names = vector_names(f"{q}{a + 1}")
+                state |= {name: f"{q}[n{a} + np.uintp({axis})]" for axis, name in enumerate(names)}
+        text: Text = self.binder.law(force.traced, force, state, "u", table, tag)
+        self._at_time += text.at_time
+        switch = self.binder.numbers.number(lambda: float(force.enabled))
+        evaluate = [
+            f"# {force.name}",
+            f"if {switch} != 0:",
+            f"    for u in {self.loop}(s{j}, e{j}):",
+            *(f"        n{a} = np.uintp(3) * np.uintp(E{j}[{nodes} * u + {a}])" for a in range(nodes)),
+            *indented(text.lines, 2),
+            f"        b = np.uintp({3 * nodes} * (u - s{j}))",
+            *(f"        B{j}[b + np.uintp({k})] = {out}" for k, out in enumerate(text.outputs)),
+        ]
+        gather = [
+            f"# {force.name}",
+            f"if {switch} != 0:",
+            f"    for u in range(J{j}[g], J{j}[g + 1]):",
+            f"        b = np.uintp(3) * np.uintp(I{j}[u])",
+            *(f"        f_{a} = f_{a} + B{j}[b + np.uintp({k})]" for k, a in enumerate("xyz")),
+        ]
+        return evaluate, gather
+
+
+UNARY = {name: f"{q}[o_{axis}]" for q in "xv" for axis, name in zip("xyz", vector_names(q), strict=True)}
+
+
+@dataclass(frozen=True, eq=False)
+class Incidence:
+    """The elements of a family in the order of the kernel's rows.
+
+    Attributes
+    ----------
+    order : of the elements: island by island, and within one by their number, shape (e,).
+    nodes : row of each node within its island, shape (e * k,).
+    start : first element of each island, shape (islands + 1,).
+    ends : start of each row's entries in `entries`, shape (rows + 1,).
+    entries : element within its island times k plus node, for each row by element, shape (e * k,).
+    """
+
+    order: NDArray[np.intp]
+    nodes: NDArray[np.int32]
+    start: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    entries: NDArray[np.int32]
+
+
+def incidence(rows: NDArray[np.intp], place: NDArray[np.intp], first: NDArray[np.int64]) -> Incidence:
+    """Sort the elements of a group of islands.
+
+    Parameters
+    ----------
+    rows : particles of each element, shape (e, k), all of the group.
+    place : row in the kernel of each particle of the system, shape (n,).
+    first : first row of each island, shape (islands + 1,).
+    """
+    places = place[rows]
+    island = np.searchsorted(first, places[:, 0], side="right") - 1
+    order = np.argsort(island, kind="stable")
+    places, island = places[order], island[order]
+    start = np.searchsorted(island, np.arange(len(first)), side="left").astype(np.int64)
+    k = rows.shape[1]
+    own = (np.arange(len(rows)) - start[island])[:, None] * k + np.arange(k)
+    by_row = np.argsort(places.ravel(), kind="stable")
+    ends = np.searchsorted(places.ravel()[by_row], np.arange(first[-1] + 1), side="left").astype(np.int64)
+    local = places - first[island][:, None]
+    return Incidence(order, local.astype(np.int32).ravel(), start, ends, own.ravel()[by_row].astype(np.int32))

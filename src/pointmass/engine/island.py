@@ -1,0 +1,165 @@
+"""The kernel that takes islands from step to step: everything that a system can do, island by island.
+
+It is printed twice from one text: in `many` a parallel loop takes islands, each by one thread; in `one` a single large
+island is worked on by all threads, loop by loop.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.engine import store
+from pointmass.engine.forces import Deriv, Incidence, incidence
+from pointmass.engine.printing import indented
+from pointmass.engine.steps import step_text
+from pointmass.solvers.base import Solver
+from pointmass.system import ParticleSystem
+
+CHUNKS = 256  # tasks that the islands are cut into, whatever the number of threads
+NOT_FINITE = 1  # status of an island
+
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Span:
+    """Steps on the grid of time: from t0 + first dt, `count` of them."""
+
+    t0: float
+    dt: float
+    first: int
+    count: int
+
+
+class IslandKernel:
+    """Advances a group of islands.
+
+    Parameters
+    ----------
+    parallel : one large island by all threads, instead of many by one thread each.
+    """
+
+    def __init__(self, system: ParticleSystem, solver: Solver, parallel: bool) -> None:
+        self.system, self.solver = system, solver
+        self.dtype = str(system.particles.dtype)
+        self.deriv = Deriv(system, parallel)
+        self.text = self._printed(parallel)
+
+    def _printed(self, parallel: bool) -> str:
+        deriv, order = self.deriv, self.system.order
+        step = step_text(self.solver, order, self.dtype, deriv.loop, self.system.velocity_dependent)
+        work = [*step.work, "x1", "v1"]
+        call = f"deriv({deriv.call}, "
+        lines = [line.replace("DERIV(", call) for line in step.lines]
+        keep = ["x[q] = x1[q]"] + ["v[q] = v1[q] if C[0, base + q // 3] != 0 else R(0)"] * (order == 2)
+        advance = [
+            f"@njit({deriv.flags})",
+            f"def advance({deriv.call}, t, h, x, v, {', '.join(work)}):",
+            "    status = 0",
+            "    hr = R(h)",
+            *indented(lines, 1),
+            f"    for q in {deriv.loop}(3 * n):",
+            *indented(keep, 2),
+            "    return status",
+            "",
+            "",
+        ]
+        ranges = [f"s{f.number} = S{f.number}[island]" for f in deriv.families]
+        ranges += [f"e{f.number} = S{f.number}[island + 1]" for f in deriv.families]
+        buffers = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{f.number + 1}], R)" for f in deriv.families]
+        scratch = [f"{name} = np.empty(3 * M[0], R)" for name in work]
+        starts = [f"S{f.number}" for f in deriv.families]
+        island = [
+            "base = first[island]",
+            "n = first[island + 1] - base",
+            *ranges,
+            "xi = x[3 * base:3 * (base + n)]",
+            "vi = v[3 * base:3 * (base + n)]",
+            "bad = 0",
+            "for s in range(count):",
+            "    ta = t0 + (k0 + s) * dt",
+            "    tb = t0 + (k0 + s + 1) * dt",
+            "    if birth[island] >= tb or bad != 0:",
+            "        continue",
+            "    ta = max(ta, birth[island])",
+            f"    bad |= advance({deriv.call}, ta, tb - ta, xi, vi, {', '.join(work)})",
+            "status[island] = bad",
+        ]
+        name = f"def run(first, x, v, {', '.join([*deriv.data, *starts])}, M, birth, t0, dt, k0, count, status):"
+        if parallel:
+            body = ["island = 0", *buffers, *scratch, *island]
+            run = ["@njit(**FLAGS)", name, *indented(body, 1)]
+        else:
+            body = [
+                f"lo = chunk * islands // {CHUNKS}",
+                f"hi = (chunk + 1) * islands // {CHUNKS}",
+                "if lo < hi:",
+                *indented([*buffers, *scratch], 1),
+                "    for island in range(lo, hi):",
+                *indented(island, 2),
+            ]
+            run = ["@njit(parallel=True, **FLAGS)", name, "    islands = len(first) - 1"]
+            run += [f"    for chunk in prange({CHUNKS}):", *indented(body, 2)]
+        return f"{deriv.text}\n\n" + "\n".join([*advance, *run, ""])
+
+    def title(self) -> str:
+        """What the kernel is, in a line."""
+        forces = ", ".join(f.name for f in self.system.forces) or "no force"
+        return f"{self.solver.name} under {forces}, order {self.system.order}"
+
+
+class IslandGroup:
+    """A group of islands in the order of the kernel.
+
+    Parameters
+    ----------
+    members : particles of each island, one after the other.
+    first : where each island begins in `members`, shape (islands + 1,).
+    """
+
+    def __init__(self, kernel: IslandKernel, members: Rows, first: NDArray[np.int64]) -> None:
+        system = kernel.system
+        self.kernel, self.members, self.first = kernel, members, first
+        place = np.full(len(system.particles), -1, np.intp)
+        place[members] = np.arange(len(members))
+        self.place = place
+        everybody = np.array_equal(members, np.arange(len(system.particles)))
+        self.order = None if everybody else members
+        self.incidences = [self._incidence(f.force) for f in kernel.deriv.families]
+
+    def _incidence(self, force: Any) -> tuple[Rows, Incidence]:
+        rows = force.rows(self.kernel.system.particles)
+        mine = np.flatnonzero(self.place[rows[:, 0]] >= 0)
+        found = incidence(rows[mine], self.place, self.first)
+        return mine[found.order], found
+
+    def run(self, functions: Any, x: Any, v: Any, birth: Any, span: Span) -> NDArray[np.int64]:
+        """Advance positions and velocities, shape (3 * rows,), in place; status of each island.
+
+        Parameters
+        ----------
+        functions : of the kernel, by name.
+        birth : when each island begins [s], shape (islands,).
+        """
+        deriv, count = self.kernel.deriv, len(self.members)
+        dtype = self.kernel.system.particles.dtype
+        data: list[Any] = [deriv.binder.numbers.array(), deriv.binder.particle.array(count, dtype, self.order)]
+        starts, most = [], [int(np.diff(self.first).max(initial=0))]
+        for family, (elements, found) in zip(deriv.families, self.incidences, strict=True):
+            data += [found.nodes, family.table.array(len(elements), dtype, elements), found.ends, found.entries]
+            starts.append(found.start)
+            most.append(int(np.diff(found.start).max(initial=0)))
+        status = np.zeros(len(self.first) - 1, np.int64)
+        functions["run"](
+            self.first, x, v, *data, *starts, np.array(most), birth, span.t0, span.dt, span.first, span.count, status
+        )
+        return status
+
+    def functions(self) -> dict[str, Any]:
+        """The kernel's functions, compiled when first called."""
+        kernel = self.kernel
+        return vars(store.load(kernel.title(), kernel.text, kernel.dtype))
