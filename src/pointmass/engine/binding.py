@@ -37,12 +37,16 @@ class Table:
     getters: list[Callable[[], Array]] = field(default_factory=list)
     _known: dict[str, int] = field(default_factory=dict)
 
-    def column(self, key: str, get: Callable[[], Array]) -> int:
-        """The number of the row of a column; one with a key that is known is shared."""
+    def column(self, key: str, get: Callable[[], Array], index: str) -> str:
+        """The entry of a column as an expression; a column with a key that is known is shared."""
         if key not in self._known:
             self._known[key] = len(self.getters)
             self.getters.append(get)
-        return self._known[key]
+        return self.entry(self._known[key], index)
+
+    def entry(self, column: int, index: str) -> str:
+        """An entry as an expression."""
+        return f"{self.name}[{column}, {index}]"
 
     def array(self, length: int, dtype: Any, order: NDArray[np.intp] | None) -> Array:
         """All columns now, in the order of the kernel's rows."""
@@ -58,11 +62,14 @@ class Numbers:
     """Numbers that all rows share: the entries of one array in the kernel, read into locals p0, p1, ..."""
 
     getters: list[Callable[[], float]] = field(default_factory=list)
+    _known: dict[str, int] = field(default_factory=dict)
 
-    def number(self, get: Callable[[], float]) -> str:
-        """The local that holds a number."""
-        self.getters.append(get)
-        return f"p{len(self.getters) - 1}"
+    def number(self, key: str, get: Callable[[], float]) -> str:
+        """The local that holds a number; one with a key that is known is shared."""
+        if key not in self._known:
+            self._known[key] = len(self.getters)
+            self.getters.append(get)
+        return f"p{self._known[key]}"
 
     def array(self) -> NDArray[np.float64]:
         """All numbers now."""
@@ -94,22 +101,34 @@ class Binder:
 
     Parameters
     ----------
-    dtype : "float64" or "float32".
+    columns : where columns of the particles go; its first one is the inverse mass.
+    switches : whether forces can be switched off without another kernel.
     """
 
-    def __init__(self, particles: Particles) -> None:
+    def __init__(self, particles: Particles, columns: Table, switches: bool = True) -> None:
+        self.switches = switches
         self.particles = particles
         self.dtype = str(particles.dtype)
         self.numbers = Numbers()
-        self.particle = Table("C")
+        self.particle = columns
+        self.attribute("w", "")
 
     def attribute(self, name: str, index: str) -> str:
         """A column of the particles."""
         if name == "w":
-            return f"C[{self.particle.column('w', lambda: self.particles.w)}, {index}]"
-        return f"C[{self.particle.column(name, lambda: self.particles.column(name))}, {index}]"
+            return self.particle.column("w", lambda: self.particles.w, index)
+        return self.particle.column(name, lambda: self.particles.column(name), index)
 
-    def law(self, traced: Traced, force: Force, state: Mapping[str, str], index: str, table: Table, tag: str) -> Text:
+    def law(
+        self,
+        traced: Traced,
+        force: Force,
+        state: Mapping[str, str],
+        index: str,
+        table: Table,
+        tag: str,
+        time: str = "t",
+    ) -> Text:
         """A law of a force.
 
         Parameters
@@ -119,25 +138,29 @@ class Binder:
         index : of the item in its table.
         table : where columns of parameters go.
         tag : keeps its locals apart.
+        time : the local that holds the time, a float64.
         """
         program = expanded(traced.program)
         needed = program.arguments()
         names, at_time, lines = dict(state), [], []
         for parameter in force.parameters.values():
-            for name, expression, timed, own in self._parameter(force, parameter, needed, index, table, tag):
+            for name, expression, timed, own in self._parameter(force, parameter, needed, index, table, tag, time):
                 names[name] = expression
                 at_time += timed
                 lines += own
         body, outputs = statements(program, names, f"{tag}_", self.dtype)
         return Text(at_time, lines + body, outputs)
 
-    def selected(self, force: Force, index: str) -> str:
-        """The condition under which a force acts on a row."""
-        switch = self.numbers.number(lambda: float(force.enabled))
-        if force.on is None:
-            return f"{switch} != 0"
-        column = self.particle.column(f"on {id(force)}", lambda: self._mask(force))
-        return f"({switch} != 0 and C[{column}, {index}] != 0)"
+    def selected(self, force: Force, index: str) -> str | None:
+        """The condition under which a force acts on a row; None if it always does."""
+        tests = [f"{self.switch(force)} != 0"] if self.switches else []
+        if force.on is not None:
+            tests.append(f"{self.particle.column(f'on {id(force)}', lambda: self._mask(force), index)} != 0")
+        return " and ".join(tests) or None
+
+    def switch(self, force: Force) -> str:
+        """The local that is not 0 where a force is enabled."""
+        return self.numbers.number(f"enabled {id(force)}", lambda: float(force.enabled))
 
     def _mask(self, force: Force) -> Array:
         mask = np.zeros(len(self.particles), self.particles.dtype)
@@ -145,7 +168,7 @@ class Binder:
         return mask
 
     def _parameter(
-        self, force: Force, parameter: Parameter, needed: set[str], index: str, table: Table, tag: str
+        self, force: Force, parameter: Parameter, needed: set[str], index: str, table: Table, tag: str, time: str
     ) -> list[tuple[str, str, list[str], list[str]]]:
         """(input, expression, statements of the time, statements of the item) of each component that is needed."""
         found = []
@@ -153,25 +176,31 @@ class Binder:
         for axis, (name, component) in enumerate(zip(inputs, parameter.components, strict=True)):
             if name in needed:
                 get = _getter(force, parameter.name, axis)
-                found.append((name, *self._component(component, get, name, index, table, tag)))
+                key = f"{id(force)} {name}"
+                found.append((name, *self._component(component, get, key, index, table, f"{tag}_{name}_", time)))
         return found
 
     def _component(
-        self, component: Component, get: Callable[[], Component], name: str, index: str, table: Table, tag: str
+        self,
+        component: Component,
+        get: Callable[[], Component],
+        key: str,
+        index: str,
+        table: Table,
+        prefix: str,
+        time: str,
     ) -> tuple[str, list[str], list[str]]:
         value = component.value
         if isinstance(value, float):
-            return self.numbers.number(lambda: float(get().value)), [], []  # type: ignore[arg-type]
+            return self.numbers.number(key, lambda: float(get().value)), [], []  # type: ignore[arg-type]
         if isinstance(value, np.ndarray):
-            column = table.column(f"{tag} {name}", lambda: get().value)  # type: ignore[arg-type, return-value]
-            return f"{table.name}[{column}, {index}]", [], []
+            return table.column(key, lambda: get().value, index), [], []  # type: ignore[arg-type, return-value]
         program = expanded(value.program)
-        prefix = f"{tag}_{name}_"
         if not component.needs:
-            lines, (result,) = statements(program, {"t": "t"}, prefix, "float64")
+            lines, (result,) = statements(program, {"t": time}, prefix, "float64")
             bounds = _bounds(component, f"{prefix}q")
             return f"{prefix}r", [*lines, f"{prefix}q = {result}", f"{prefix}r = R({prefix}q)", *bounds], []
-        names = {n: self.attribute(n, index) for n in component.needs} | {"t": "R(t)"}
+        names = {n: self.attribute(n, index) for n in component.needs} | {"t": f"R({time})"}
         lines, (result,) = statements(program, names, prefix, self.dtype)
         return result, [], lines
 

@@ -6,13 +6,14 @@ order and element by element: nothing is scattered, so the bits depend on no thr
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.engine.binding import Binder, Table, Text
-from pointmass.engine.printing import indented
+from pointmass.engine.printing import indented, literal
 from pointmass.laws.elements import ElementForce
 from pointmass.laws.unary import UnaryForce
 from pointmass.system import ParticleSystem
@@ -59,8 +60,7 @@ class Deriv:
     def __init__(self, system: ParticleSystem, parallel: bool) -> None:
         self.system = system
         self.order = system.order
-        self.binder = Binder(system.particles)
-        self.binder.attribute("w", "g")  # the first column
+        self.binder = Binder(system.particles, Table("C"))
         self.families: list[Elements] = []
         self.loop = "prange" if parallel else "range"
         self.flags = "parallel=True, **FLAGS" if parallel else "**FLAGS"
@@ -81,7 +81,9 @@ class Deriv:
         elements, sums = [], []
         for k, force in enumerate(self.system.forces):
             if isinstance(force, UnaryForce):
-                sums += self.unary(force, f"f{k}", UNARY, "g")
+                timed, lines = unary(self.binder, force, f"f{k}", UNARY, "g")
+                self._at_time += timed
+                sums += lines
             elif isinstance(force, ElementForce):
                 evaluate, gather = self._elements(force, f"f{k}")
                 elements += evaluate
@@ -115,19 +117,6 @@ class Deriv:
         ]
         return "\n".join(lines)
 
-    def unary(self, force: UnaryForce, tag: str, state: dict[str, str], index: str) -> list[str]:
-        """Statements that add a force on one particle to f_x, f_y, f_z."""
-        names = state | {"m": self.binder.attribute("m", index) if "m" in force.traced.depends_on else "", "t": "R(t)"}
-        text = self.binder.law(force.traced, force, names, index, self.binder.particle, tag)
-        self._at_time += text.at_time
-        acts = self.binder.selected(force, index)
-        adds = [
-            f"f_{a} = f_{a} + ({out} if {acts} else R(0))"
-            for a, out in zip("xyz", text.outputs, strict=True)
-            if out not in ("0.0", "np.float32(0.0)")
-        ]
-        return [f"# {force.name}", *text.lines, *adds]
-
     def _elements(self, force: ElementForce, tag: str) -> tuple[list[str], list[str]]:
         """Statements that evaluate elements into their buffer, and those that add them up on a particle."""
         j, nodes = len(self.families), force.nodes
@@ -140,7 +129,7 @@ class Deriv:
                 state |= {name: f"{q}[n{a} + np.uintp({axis})]" for axis, name in enumerate(names)}
         text: Text = self.binder.law(force.traced, force, state, "u", table, tag)
         self._at_time += text.at_time
-        switch = self.binder.numbers.number(lambda: float(force.enabled))
+        switch = self.binder.switch(force)
         evaluate = [
             f"# {force.name}",
             f"if {switch} != 0:",
@@ -158,6 +147,28 @@ class Deriv:
             *(f"        f_{a} = f_{a} + B{j}[b + np.uintp({k})]" for k, a in enumerate("xyz")),
         ]
         return evaluate, gather
+
+
+def unary(
+    binder: Binder, force: UnaryForce, tag: str, state: Mapping[str, str], index: str, time: str = "t"
+) -> tuple[list[str], list[str]]:
+    """Statements of the time, and those that add a force on one particle to f_x, f_y, f_z.
+
+    Parameters
+    ----------
+    tag : keeps its locals apart.
+    state : expressions of x_x, ..., v_z.
+    """
+    mass = {"m": binder.attribute("m", index)} if "m" in force.traced.depends_on else {}
+    names = {**state, **mass, "t": f"R({time})"}
+    text = binder.law(force.traced, force, names, index, binder.particle, tag, time)
+    acts = binder.selected(force, index)
+    adds = [
+        f"f_{a} = f_{a} + {out if acts is None else f'({out} if {acts} else R(0))'}"
+        for a, out in zip("xyz", text.outputs, strict=True)
+        if out != literal(0.0, binder.dtype)
+    ]
+    return text.at_time, [f"# {force.name}", *text.lines, *adds]
 
 
 UNARY = {name: f"{q}[o_{axis}]" for q in "xv" for axis, name in zip("xyz", vector_names(q), strict=True)}
