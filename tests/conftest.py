@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 from hypothesis import settings
 
+# Most tests make small systems of many kinds: to compile each would take hours. Those of the engine ask for it.
+os.environ.setdefault("POINTMASS_ENGINE", "reference")
 settings.register_profile("same examples each time", derandomize=True)  # so that a commit cannot fail by chance
 
 

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.emitters.emitter import Birth, Emitter
-from pointmass.engine.reference import ReferenceEngine
+from pointmass.engine.engine import Engine, compiled_by_default
+from pointmass.engine.island import Span
 from pointmass.errors import Diverged, InvalidInput, number, shown, whole_number
 from pointmass.frame import Frame
 from pointmass.look import Look, Stage
@@ -39,11 +40,15 @@ class Simulation:
     emitters : where particles come from.
     look : how frames look.
     seed : all chance comes from it.
+    compiled : whether laws and solver are compiled to run at the speed of the machine (by default they are, unless the
+        environment variable POINTMASS_ENGINE is "reference"). False keeps to the reference path, in NumPy; so does a
+        system that has something which cannot be compiled, such as an `array_force`.
 
     Attributes
     ----------
     t : time now [s].
     steps : how many steps of dt were made.
+    engine : what makes them.
 
     Raises
     ------
@@ -67,6 +72,7 @@ class Simulation:
         emitters: Sequence[Emitter] = (),
         look: Look | None = None,
         seed: int = 0,
+        compiled: bool | None = None,
     ) -> None:
         if not isinstance(system, ParticleSystem):
             raise InvalidInput(f"system must be a pm.ParticleSystem, not {shown(system)}")
@@ -82,7 +88,7 @@ class Simulation:
         self.t0 = system.t
         self.steps = 0
         self.frames_seen = 0
-        self.engine = ReferenceEngine(system, self.solver)
+        self.engine = Engine(system, self.solver, compiled_by_default() if compiled is None else compiled)
         self._start = system.get_state()
         self._stage = Stage(self.look, system.particles.x)
         self._looks = self.t0, 0, 1.0  # time of a frame, how many were looked at from it on, and how many in a second
@@ -105,8 +111,9 @@ class Simulation:
         InvalidInput
             A parameter that is a function of t has a value that is not allowed; the system keeps its last good state.
         """
-        for _ in range(whole_number("count", count, at_least=0)):
-            self._step()
+        end = self.steps + whole_number("count", count, at_least=0)
+        while self.steps < end:
+            self._advance(end - self.steps)
 
     def run(self, seconds: float) -> None:
         """Make the steps that it takes to come `seconds` [s] further; the last one may end a little later.
@@ -183,44 +190,74 @@ class Simulation:
     def _grid(self, k: int) -> float:
         return self.t0 + k * self.dt  # never accumulated
 
-    def _step(self) -> None:
-        t0, t1 = self._grid(self.steps), self._grid(self.steps + 1)
+    def _advance(self, most: int, look_inside: bool = False) -> None:
+        """Make one or more steps, up to `most`, in one go if they are compiled.
+
+        Parameters
+        ----------
+        look_inside : whether the state within the last step will be asked for.
+        """
+        if not self.engine.compiled:
+            self._step()
+            return
+        single = (self.emitters or len(self._mortal)) and self.engine.coupled
+        span = Span(self.t0, self.dt, self.steps, 1 if single else min(most, self.engine.longest()))
+        born = [birth for k in range(span.count) for birth in enumerate(self.births(span.first + k))]
         old = len(self.system.particles)
-        born = self.births(self.steps)
-        clock = self._bear(born, t0)
+        clock = self._bear(born, span.start)
+        if self.engine.run(span, clock, look_inside) and self._slow_enough():
+            self._age(span, clock)
+            self.steps += span.count
+            self._bury(born, span.end)
+            return
+        self.engine.restore()
+        self.system.remove(np.arange(old, len(self.system.particles)))
+        for _ in range(span.count):  # step by step, to see what it is and where
+            self._step()
+
+    def _step(self) -> None:
+        """One step on the reference path."""
+        span = Span(self.t0, self.dt, self.steps, 1)
+        old = len(self.system.particles)
+        born = list(enumerate(self.births(self.steps)))
+        clock = self._bear(born, span.start)
         before = self.system.get_state()
         try:
-            self.engine.step(t0, t1, clock)
+            self.engine.step(span, clock)
             self._check_speed(before)
         except Diverged as error:
-            self.system.set_state(before, t0)
+            self.system.set_state(before, span.start)
             explained = self._explained(error)
             self.system.remove(np.arange(old, len(self.system.particles)))
             raise explained from error
         except InvalidInput:  # a parameter that is no longer allowed
-            self.system.set_state(before, t0)
+            self.system.set_state(before, span.start)
             self.system.remove(np.arange(old, len(self.system.particles)))
             raise
+        self._age(span, clock)
         self.steps += 1
-        self._age(t0, t1, clock)
-        self._bury(born, t1)
+        self._bury(born, span.end)
 
-    def _bear(self, born: Sequence[Birth], t0: float) -> Array | None:
-        """Add the particles that are born in a step; returns the clock of all particles, None if all begin at t0."""
+    def _bear(self, born: Sequence[tuple[int, Birth]], t0: float) -> Array | None:
+        """Add the particles that are born from t0 on, each with the number of its emitter; returns the clock of all
+        particles, None if all begin at t0."""
         clock = [np.full(len(self.system.particles), t0)]
-        for k, birth in enumerate(born):
+        for k, birth in born:
             if len(birth.number):
                 self.system.add(birth.x, birth.v, id=birth.ids(k), **birth.columns)
                 clock.append(np.maximum(birth.time, t0))
         return np.concatenate(clock) if len(clock) > 1 else None
 
-    def _age(self, t0: float, t1: float, clock: Array | None) -> None:
+    def _age(self, span: Span, clock: Array | None) -> None:
         age = self.system.particles.age
-        age += (t1 - (np.full(len(age), t0) if clock is None else clock)).astype(age.dtype)
+        for k in range(span.count):
+            start, end = span.time(k), span.time(k + 1)
+            lived = end - (start if clock is None else np.clip(clock, start, end))
+            age += np.asarray(lived, age.dtype)
 
-    def _bury(self, born: Sequence[Birth], t1: float) -> None:
+    def _bury(self, born: Sequence[tuple[int, Birth]], t1: float) -> None:
         """Take away those whose time has come by t1."""
-        for k, birth in enumerate(born):
+        for k, birth in born:
             mortal = np.isfinite(birth.lifetime)
             if mortal.any():
                 self._mortal = np.append(self._mortal, birth.ids(k)[mortal])
@@ -237,7 +274,9 @@ class Simulation:
             k = (time - self.t0) / self.dt
             on_grid = abs(k - round(k)) < ON_GRID * max(1.0, k)
             steps = round(k) if on_grid else math.ceil(k)
-            self.step(max(0, steps - self.steps))
+            self.step(max(0, steps - self.steps - (not on_grid)))
+            if self.steps < steps:
+                self._advance(1, look_inside=True)
             number, self.frames_seen = self.frames_seen, self.frames_seen + 1
             yield self.frame(number, self._grid(steps) if on_grid else time)
 
@@ -275,15 +314,19 @@ class Simulation:
     def _check_speed(self, before: Array) -> None:
         """Speeds may grow, as in a field that does; but not because steps are too long for the motion."""
         p = self.system.particles
-        speed = float(np.abs(p.v).max(initial=0.0))
-        if control_of(self.solver) is not None or (
-            speed <= self._speed_limit and np.abs(p.x).max(initial=0.0) <= 1e3 * self._speed_limit
-        ):
+        if self._slow_enough():
             return
         one, two = (self._end_of(before, pieces)[-3 * len(p) :] for pieces in (1, 2))
         if not np.abs(one - two).max() <= AGREE * np.abs(two).max():
             raise Diverged("speeds grow without bound")
-        self._speed_limit = RUNAWAY * max(speed, float(np.abs(p.x).max()))
+        self._speed_limit = RUNAWAY * max(self.engine.fastest, self.engine.farthest)
+
+    def _slow_enough(self) -> bool:
+        """Whether nobody is much faster, or farther away, than all that the run has shown so far explains."""
+        limit = self._speed_limit
+        return control_of(self.solver) is not None or (
+            self.engine.fastest <= limit and self.engine.farthest <= 1e3 * limit
+        )
 
     def _end_of(self, y: Array, pieces: int) -> Array:
         """State at the end of the step that began at `y`, if there were no colliders, made in pieces."""

@@ -7,6 +7,7 @@ island is worked on by all threads, loop by loop.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,20 @@ from pointmass.system import ParticleSystem
 CHUNKS = 256  # tasks that the islands are cut into, whatever the number of threads
 NOT_FINITE = 1  # status of an island
 
+REACHED = '''@njit(**FLAGS)
+def reached(x, n):
+    """Largest size of the first 3n numbers; infinite where one is not finite."""
+    most = 0.0
+    for q in range(3 * n):
+        size = abs(x[q])
+        if not size <= most:
+            most = size if size < np.inf else np.inf
+    return most
+
+
+'''
+
+Array = NDArray[np.floating[Any]]
 Rows = NDArray[np.intp]
 
 
@@ -33,6 +48,20 @@ class Span:
     dt: float
     first: int
     count: int
+
+    def time(self, k: int) -> float:
+        """When step k of the span begins [s]; never accumulated."""
+        return self.t0 + (self.first + k) * self.dt
+
+    @property
+    def start(self) -> float:
+        """Begin of the first step [s]."""
+        return self.time(0)
+
+    @property
+    def end(self) -> float:
+        """End of the last step [s]."""
+        return self.time(self.count)
 
 
 class IslandKernel:
@@ -87,9 +116,12 @@ class IslandKernel:
             "        continue",
             "    ta = max(ta, birth[island])",
             f"    bad |= advance({deriv.call}, ta, tb - ta, xi, vi, {', '.join(work)})",
-            "status[island] = bad",
+            "far, fast = reached(xi, n), reached(vi, n)",
+            f"status[island] = bad if far < np.inf and fast < np.inf else {NOT_FINITE}",
+            "reach[island, 0] = far",
+            "reach[island, 1] = fast",
         ]
-        name = f"def run(first, x, v, {', '.join([*deriv.data, *starts])}, M, birth, t0, dt, k0, count, status):"
+        name = f"def run(first, x, v, {', '.join([*deriv.data, *starts])}, M, birth, t0, dt, k0, count, status, reach):"
         if parallel:
             body = ["island = 0", *buffers, *scratch, *island]
             run = ["@njit(**FLAGS)", name, *indented(body, 1)]
@@ -104,62 +136,62 @@ class IslandKernel:
             ]
             run = ["@njit(parallel=True, **FLAGS)", name, "    islands = len(first) - 1"]
             run += [f"    for chunk in prange({CHUNKS}):", *indented(body, 2)]
-        return f"{deriv.text}\n\n" + "\n".join([*advance, *run, ""])
+        return f"{REACHED}{deriv.text}\n\n" + "\n".join([*advance, *run, ""])
 
+    @property
     def title(self) -> str:
         """What the kernel is, in a line."""
         forces = ", ".join(f.name for f in self.system.forces) or "no force"
         return f"{self.solver.name} under {forces}, order {self.system.order}"
 
+    @cached_property
+    def functions(self) -> dict[str, Any]:
+        """By name; each is compiled when it is first called."""
+        return vars(store.load(self.title, self.text, self.dtype))
 
-class IslandGroup:
-    """A group of islands in the order of the kernel.
+    def members(self, rows: Rows, labels: Rows) -> IslandMembers:
+        """Particles to be advanced: see `IslandMembers`."""
+        return IslandMembers(self, rows, labels)
+
+
+class IslandMembers:
+    """The islands of a group in the order of the kernel's rows.
 
     Parameters
     ----------
-    members : particles of each island, one after the other.
-    first : where each island begins in `members`, shape (islands + 1,).
+    rows : particles of each island, one after the other.
+    labels : island of each, shape (rows,).
     """
 
-    def __init__(self, kernel: IslandKernel, members: Rows, first: NDArray[np.int64]) -> None:
-        system = kernel.system
-        self.kernel, self.members, self.first = kernel, members, first
-        place = np.full(len(system.particles), -1, np.intp)
-        place[members] = np.arange(len(members))
-        self.place = place
-        everybody = np.array_equal(members, np.arange(len(system.particles)))
-        self.order = None if everybody else members
-        self.incidences = [self._incidence(f.force) for f in kernel.deriv.families]
+    def __init__(self, kernel: IslandKernel, rows: Rows, labels: Rows) -> None:
+        self.kernel, self.rows = kernel, rows
+        self.first = np.append(np.flatnonzero(np.diff(labels, prepend=-1)), len(rows)).astype(np.int64)
+        self.place = np.full(len(kernel.system.particles), -1, np.intp)
+        self.place[rows] = np.arange(len(rows))
+        everybody = len(rows) == len(self.place) and bool((np.diff(rows) == 1).all())
+        self.order = None if everybody else rows
+        self.families = [self._family(f.force) for f in kernel.deriv.families]
 
-    def _incidence(self, force: Any) -> tuple[Rows, Incidence]:
-        rows = force.rows(self.kernel.system.particles)
-        mine = np.flatnonzero(self.place[rows[:, 0]] >= 0)
-        found = incidence(rows[mine], self.place, self.first)
+    def _family(self, force: Any) -> tuple[Rows, Incidence]:
+        """Elements of a force in the order of the kernel, and where they are."""
+        nodes = force.rows(self.kernel.system.particles)
+        mine = np.flatnonzero(self.place[nodes[:, 0]] >= 0)
+        found = incidence(nodes[mine], self.place, self.first)
         return mine[found.order], found
 
-    def run(self, functions: Any, x: Any, v: Any, birth: Any, span: Span) -> NDArray[np.int64]:
-        """Advance positions and velocities, shape (3 * rows,), in place; status of each island.
-
-        Parameters
-        ----------
-        functions : of the kernel, by name.
-        birth : when each island begins [s], shape (islands,).
-        """
-        deriv, count = self.kernel.deriv, len(self.members)
+    def run(self, x: Array, v: Array, births: Array | None, span: Span) -> tuple[bool, Array]:
+        """Advance positions and velocities, shape (3 * rows,), in place."""
+        deriv, count = self.kernel.deriv, len(self.rows)
         dtype = self.kernel.system.particles.dtype
         data: list[Any] = [deriv.binder.numbers.array(), deriv.binder.particle.array(count, dtype, self.order)]
         starts, most = [], [int(np.diff(self.first).max(initial=0))]
-        for family, (elements, found) in zip(deriv.families, self.incidences, strict=True):
+        for family, (elements, found) in zip(deriv.families, self.families, strict=True):
             data += [found.nodes, family.table.array(len(elements), dtype, elements), found.ends, found.entries]
             starts.append(found.start)
             most.append(int(np.diff(found.start).max(initial=0)))
-        status = np.zeros(len(self.first) - 1, np.int64)
-        functions["run"](
-            self.first, x, v, *data, *starts, np.array(most), birth, span.t0, span.dt, span.first, span.count, status
-        )
-        return status
-
-    def functions(self) -> dict[str, Any]:
-        """The kernel's functions, compiled when first called."""
-        kernel = self.kernel
-        return vars(store.load(kernel.title(), kernel.text, kernel.dtype))
+        islands = len(self.first) - 1
+        begin = np.full(islands, -np.inf) if births is None else np.maximum.reduceat(births, self.first[:-1])
+        status, reach = np.zeros(islands, np.int64), np.zeros((islands, 2))
+        grid = (span.t0, span.dt, span.first, span.count)
+        self.kernel.functions["run"](self.first, x, v, *data, *starts, np.array(most), begin, *grid, status, reach)
+        return not status.any(), reach.max(axis=0)

@@ -7,9 +7,17 @@ once, so that memory is touched once a frame. Tiles are always padded to full wi
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.engine import store
 from pointmass.engine.binding import Binder, Table
 from pointmass.engine.forces import unary
+from pointmass.engine.island import NOT_FINITE, Span
 from pointmass.engine.printing import indented, literal
 from pointmass.laws.unary import UnaryForce
 from pointmass.solvers.base import Solver
@@ -17,11 +25,32 @@ from pointmass.solvers.explicit import ExplicitRungeKutta
 from pointmass.solvers.splitting import Splitting
 from pointmass.system import ParticleSystem
 
+Array = NDArray[np.floating[Any]]
+Rows = NDArray[np.intp]
 W = 256  # lanes of a tile
 AXES = "xyz"
 UNROLLED = (4, 1)  # steps that a lane makes in registers
 LONG = 60  # statements of a step that are not unrolled
-TRANSPOSED = f'''@njit(**FLAGS)
+TRANSPOSED = f'''BITS = np.int32 if R is np.float32 else np.int64
+SIZE = BITS(np.iinfo(BITS).max)  # all bits but the sign
+
+
+@njit(**FLAGS)
+def reached(s, offset, m):
+    """Largest size of three runs of lanes. As whole numbers, the bits of a size are in the order of the sizes, and NaN
+    is above all: so the loop is one of vectors."""
+    bits = s.view(BITS)
+    most = BITS(0)
+    for c in range(3):
+        o = np.uintp(offset + {W} * c)
+        for j in range(m):
+            most = max(most, bits[o + np.uintp(j)] & SIZE)
+    found = np.empty(1, BITS)
+    found[0] = most
+    return found.view(R)[0]
+
+
+@njit(**FLAGS)
 def load(s, offset, x, lo, m):
     """Rows of x, (x, y, z) each, to three runs of lanes."""
     o = np.uintp(offset)
@@ -76,6 +105,7 @@ class Motion:
 
     def __init__(self, system: ParticleSystem, solver: Solver) -> None:
         self.system, self.solver = system, solver
+        self.forces = [force for force in system.forces if isinstance(force, UnaryForce)]
         self.binder = Binder(system.particles, Lanes("s"), switches=not all(f.enabled for f in system.forces))
         self.dtype = self.binder.dtype
         self.at_time: list[str] = []
@@ -98,9 +128,10 @@ class Motion:
         self.at_time.append(f"s{k} = {time}")
         self.lines += [f"f_{a} = R(0)" for a in AXES]
         state = {f"{q}_{a}": f"{name}_{a}" for q, name in (("x", x), ("v", v)) for a in AXES}
-        for j, force in enumerate(self.system.forces):
-            assert isinstance(force, UnaryForce)
-            self.timed = self.timed or "t" in force.traced.depends_on or not all(p.steady for p in force.parameters.values())
+        for j, force in enumerate(self.forces):
+            self.timed = (
+                self.timed or "t" in force.traced.depends_on or not all(p.steady for p in force.parameters.values())
+            )
             timed, lines = unary(self.binder, force, f"f{j}_{k}", state, "i", f"s{k}")
             self.at_time += timed
             self.lines += lines
@@ -145,9 +176,7 @@ class Motion:
                 self._deriv(f"t + {before!r} * h", "x1", "v1", "a")
             for a in AXES:
                 self.lines.append(f"v1_{a} = v1_{a} + {literal(opening, self.dtype)} * hr * a_{a}")
-                self.lines.append(
-                    f"x1_{a} = x1_{a} + {literal(drift, self.dtype)} * hr * {self._free(f'v1_{a}')}"
-                )
+                self.lines.append(f"x1_{a} = x1_{a} + {literal(drift, self.dtype)} * hr * {self._free(f'v1_{a}')}")
             fresh = closing != 0.0 and not depends
             if closing != 0.0:
                 self.lines += [f"b_{a} = v1_{a}" for a in AXES]
@@ -180,7 +209,7 @@ class SinglesKernel:
             steps += [f"while k + {u} <= k0 + count:", f"    bad |= lanes{u}(s, P, {times})", f"    k += {u}"]
         run = [
             "@njit(parallel=True, **FLAGS)",
-            "def run(x, v, P, C, t0, dt, k0, count, status):",
+            "def run(x, v, P, C, t0, dt, k0, count, status, reach):",
             "    n = len(x) // 3",
             f"    for tile in prange((n + {W - 1}) // {W}):",
             f"        s = np.ones({(6 + columns) * W}, R)",
@@ -192,8 +221,10 @@ class SinglesKernel:
             "        bad = 0",
             "        k = k0",
             *indented(steps, 2),
+            *(f"        reach[tile, {k}] = reached(s, {offset}, m)" for k, (_, offset) in enumerate(copies)),
+            "        far = max(reach[tile, 0], reach[tile, 1])",
+            f"        status[tile] = bad if far < np.inf else {NOT_FINITE}",
             *(f"        keep(s, {offset}, {q}, lo, m)" for q, offset in copies),
-            "        status[tile] = bad",
             "",
         ]
         return "\n".join([TRANSPOSED, *(line for part in parts for line in part), *run])
@@ -228,7 +259,42 @@ class SinglesKernel:
         """(quantity, axis) of each component of the state."""
         return [(q, a) for q in ("xv" if self.system.order == 2 else "x") for a in AXES]
 
+    @property
     def title(self) -> str:
         """What the kernel is, in a line."""
-        forces = ", ".join(f.name for f in self.system.forces) or "no force"
+        forces = ", ".join(f.name for f in self.motion.forces) or "no force"
         return f"single particles: {self.solver.name} under {forces}, order {self.system.order}"
+
+    @cached_property
+    def functions(self) -> dict[str, Any]:
+        """By name; each is compiled when it is first called."""
+        return vars(store.load(self.title, self.text, self.motion.dtype))
+
+    def members(self, rows: Rows, labels: Rows) -> SingleMembers:
+        """Particles to be advanced: see `SingleMembers`."""
+        return SingleMembers(self, rows)
+
+
+@dataclass(frozen=True, eq=False)
+class SingleMembers:
+    """Particles that are islands of their own.
+
+    Attributes
+    ----------
+    rows : of the particles.
+    """
+
+    kernel: SinglesKernel
+    rows: Rows
+
+    def run(self, x: Array, v: Array, births: Array | None, span: Span) -> tuple[bool, Array]:
+        """Advance positions and velocities, shape (3 * rows,), in place."""
+        motion, count = self.kernel.motion, len(self.rows)
+        particles = self.kernel.system.particles
+        order = None if count == len(particles) else self.rows
+        columns = motion.binder.particle.array(count, particles.dtype, order)
+        tiles = -(-count // W)
+        status, reach = np.zeros(tiles, np.int64), np.zeros((tiles, 2), x.dtype)
+        grid = (span.t0, span.dt, span.first, span.count)
+        self.kernel.functions["run"](x, v, motion.binder.numbers.array(), columns, *grid, status, reach)
+        return not status.any(), reach.max(axis=0).astype(np.float64)

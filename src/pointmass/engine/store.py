@@ -1,8 +1,8 @@
-"""Kernels on disk: the printed source of a kernel is a file of the user's cache folder, and its machine code lies beside it.
+"""Kernels on disk: the printed source is a file of the user's cache folder, and its machine code lies beside it.
 
-A file is named by the hash of all that its code depends on, so it never changes: what is there is right. Numba keeps the
-machine code in `__pycache__` beside the file, and every later process loads it. The file is plain Python that anybody may
-read.
+A file is named by the hash of all that its code depends on, so it never changes: what is there is right. Numba keeps
+the machine code in `__pycache__` beside it, and every later process loads that. The file is plain Python that anybody
+may read.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ def _publish(path: Path, source: str) -> None:
         except FileExistsError:
             return
         except OSError:  # a file system without links
-            os.replace(beside, path)
+            Path(beside).replace(path)
             return
     finally:
         Path(beside).unlink(missing_ok=True)

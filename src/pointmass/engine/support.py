@@ -49,7 +49,7 @@ def _from_bits(typingctx: Any, a: Any) -> Any:
 @overload(bits_of, inline="always")
 def _bits_of(a: Any) -> Any:
     def compiled(a: Any) -> Any:
-        return _to_bits(np.float64(a))
+        return _to_bits(np.float64(a))  # type: ignore[call-arg]
 
     return compiled
 
@@ -57,7 +57,7 @@ def _bits_of(a: Any) -> Any:
 @overload(float_of, inline="always")
 def _float_of(bits: Any) -> Any:
     def compiled(bits: Any) -> Any:
-        return _from_bits(np.int64(bits))
+        return _from_bits(np.int64(bits))  # type: ignore[call-arg]
 
     return compiled
 
@@ -65,7 +65,7 @@ def _float_of(bits: Any) -> Any:
 @overload(power_of_two, inline="always")
 def _power_of_two(k: Any) -> Any:
     def compiled(k: Any) -> Any:
-        return _from_bits(np.int64((np.int64(k) + 1023) << 52))
+        return _from_bits(np.int64((np.int64(k) + 1023) << 52))  # type: ignore[call-arg]
 
     return compiled
 

@@ -1,0 +1,261 @@
+"""The engine of a run: compiled kernels where there are some for what the system is made of, else the reference path.
+
+Particles are grouped by the structure of their islands, and each group has the kernel of its layout. A kernel never
+raises: where one says that something went wrong, the state is what it was before the span, and the caller goes through
+it again on the reference path, which names what it was.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.engine.binding import kinds
+from pointmass.engine.island import IslandKernel, Span
+from pointmass.engine.reference import ReferenceEngine
+from pointmass.engine.singles import SinglesKernel
+from pointmass.errors import InvalidInput
+from pointmass.laws.elements import ElementForce
+from pointmass.laws.force import Force
+from pointmass.laws.unary import UnaryForce
+from pointmass.particles import Array
+from pointmass.solvers.advance import Stats
+from pointmass.solvers.base import Solver
+from pointmass.solvers.control import control_of
+from pointmass.solvers.explicit import ExplicitRungeKutta
+from pointmass.solvers.splitting import Splitting
+from pointmass.system import ParticleSystem
+from pointmass.tracing.program import Program
+
+Rows = NDArray[np.intp]
+LARGE = 4096  # particles of an island that is worth all threads
+WORK = 1e9  # particle-steps between two returns to Python: so long Ctrl-C waits
+LONGEST = 256  # steps of a span
+
+
+class Members(Protocol):
+    """The particles of a group, with what their kernel needs to know of them."""
+
+    def run(self, x: Array, v: Array, births: Array | None, span: Span) -> tuple[bool, Array]:
+        """Advance positions and velocities, flat, in place.
+
+        Returns
+        -------
+        good, reach
+            Whether nothing went wrong, and the largest |x| and |v| at the end.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Particles that one kernel advances.
+
+    Attributes
+    ----------
+    rows : of the particles, island by island; None = all, in order.
+    """
+
+    rows: Rows | None
+    members: Members
+
+
+@dataclass(eq=False)
+class Engine:
+    """Advances a system over spans of steps.
+
+    Attributes
+    ----------
+    wanted : whether kernels are wanted.
+    reference : the engine that does everything, in NumPy.
+    fastest, farthest : largest |v| [m/s] and |x| [m] of any component after the last span.
+    """
+
+    system: ParticleSystem
+    solver: Solver
+    wanted: bool
+    reference: ReferenceEngine = field(init=False)
+    fastest: float = 0.0
+    farthest: float = 0.0
+    _before: tuple[Array, Array] | None = None
+    _looked: bool = False  # whether the last step can no longer be looked into
+    _kernels: tuple[Any, dict[Any, Any]] = (None, {})
+    _groups: tuple[Any, list[Group]] = (None, [])
+
+    def __post_init__(self) -> None:
+        self.reference = ReferenceEngine(self.system, self.solver)
+
+    @property
+    def stats(self) -> Stats:
+        """Work done so far."""
+        return self.reference.stats
+
+    @property
+    def compiled(self) -> bool:
+        """Whether kernels exist for all that the system is made of now."""
+        return self.wanted and len(self.system.particles) > 0 and not self.missing()
+
+    def missing(self) -> list[str]:
+        """What of the system has no kernel."""
+        system = self.system
+        return [
+            *(force.name for force in system.forces if not _printable(force)),
+            *(collider.name for collider in system.colliders),
+            *([] if _has_step(self.solver) else [self.solver.name]),
+        ]
+
+    def longest(self) -> int:
+        """How many steps a span may have."""
+        return int(np.clip(WORK / max(1, len(self.system.particles)), 1, LONGEST))
+
+    @property
+    def coupled(self) -> bool:
+        """Whether particles act on each other: births and deaths then end a span."""
+        islands = self.system.island_of_particle
+        return len(islands) > 0 and int(islands.max()) + 1 < len(islands)
+
+    def run(self, span: Span, births: Array | None, look_inside: bool) -> bool:
+        """Take the system over a span by its kernels; False if something went wrong: then `restore` it.
+
+        Parameters
+        ----------
+        births : clock at which each particle begins [s], shape (n,); None = all at the start of the span.
+        look_inside : whether `state_at` will be asked for a time within the last step.
+        """
+        p = self.system.particles
+        self._before, self._looked = (p.x.copy(), p.v.copy()), not look_inside
+        if look_inside and span.count > 1:
+            whole = self._launch(replace(span, count=span.count - 1), births)
+            return whole and self._seen(replace(span, first=span.first + span.count - 1, count=1), births)
+        return self._seen(span, births) if look_inside else self._launch(span, births)
+
+    def _seen(self, span: Span, births: Array | None) -> bool:
+        """Make one step, and make it again on the reference path for all that a look inside it asks for."""
+        system = self.system
+        before = system.get_state()
+        if not self._launch(span, births):
+            return False
+        after, stats = system.get_state(), self.stats
+        system.set_state(before, span.start)
+        self.reference.step(span.start, span.end, None if births is None else np.maximum(births, span.start))
+        system.set_state(after, span.end)
+        self.reference.stats = stats
+        return True
+
+    def _launch(self, span: Span, births: Array | None) -> bool:
+        p = self.system.particles
+        top = np.zeros(2)
+        for group in self._grouped(births, span.start):
+            x, v = _taken(p.x, group.rows), _taken(p.v, group.rows)
+            clock = births if births is None or group.rows is None else births[group.rows]
+            good, reach = group.members.run(x, v, clock, span)
+            if not good:
+                return False
+            if group.rows is not None:
+                p.x[group.rows], p.v[group.rows] = x.reshape(-1, 3), v.reshape(-1, 3)
+            top = np.maximum(top, reach)
+        self.farthest, self.fastest = (float(t) for t in top)
+        evaluations = span.count * self.solver.evaluations
+        self.reference.stats = self.stats + Stats(steps=span.count, evaluations=evaluations)
+        self.system.t = span.end
+        return True
+
+    def state_at(self, t: float) -> Array:
+        """State of the present particles at a time within the last step, shape (dim,); nothing is changed.
+
+        Raises
+        ------
+        InvalidInput
+            The last step was not made for a look inside.
+        """
+        if self._looked and t < self.system.t:
+            raise InvalidInput(f"t = {t} s is within a step that nobody wanted to look into: use frames()")
+        return self.reference.state_at(t)
+
+    def restore(self) -> None:
+        """Put the state back that was there before the last `run`."""
+        assert self._before is not None
+        p = self.system.particles
+        p.x[:], p.v[:] = self._before
+
+    def step(self, span: Span, births: Array | None = None) -> None:
+        """One step on the reference path: see `ReferenceEngine.step`."""
+        p = self.system.particles
+        self.reference.step(span.start, span.end, births)
+        self._looked = False
+        self.farthest = float(np.abs(p.x).max(initial=0.0))
+        self.fastest = float(np.abs(p.v).max(initial=0.0))
+
+    # ------------------------------------------------------------------------------------------------ groups
+
+    def _grouped(self, births: Array | None, start: float) -> list[Group]:
+        system = self.system
+        islands = system.island_of_particle
+        newborn = None if births is None else births > start
+        key = (id(islands), system.particles.version, kinds(system.forces), newborn is None)
+        if self._groups[0] != key or newborn is not None:
+            self._groups = (key, self._made_groups(islands, newborn))
+        return self._groups[1]
+
+    def _made_groups(self, islands: Rows, newborn: NDArray[np.bool_] | None) -> list[Group]:
+        size = np.bincount(islands)[islands]
+        alone = size == 1 if newborn is None else (size == 1) & ~newborn
+        groups = [self._group(SinglesKernel, np.flatnonzero(alone), islands)] if alone.any() else []
+        large = size >= LARGE
+        for island in np.unique(islands[large]):
+            groups.append(self._group(IslandKernel, np.flatnonzero(islands == island), islands, True))
+        others = np.flatnonzero(~alone & ~large)
+        if len(others):
+            others = others[np.argsort(islands[others], kind="stable")]
+            groups.append(self._group(IslandKernel, others, islands, False))
+        return groups
+
+    def _group(self, kind: Any, rows: Rows, islands: Rows, *how: bool) -> Group:
+        everybody = len(rows) == len(islands) and bool((np.diff(rows) == 1).all())
+        return Group(None if everybody else rows, self._kernel(kind, *how).members(rows, islands[rows]))
+
+    def _kernel(self, kind: Any, *how: bool) -> Any:
+        """The kernel of a kind for the system as it is, printed once."""
+        system = self.system
+        key = (kinds(system.forces), bool(system.particles.pinned.any()), all(f.enabled for f in system.forces))
+        if self._kernels[0] != key:
+            self._kernels = (key, {})
+        known = self._kernels[1]
+        if (kind, *how) not in known:
+            known[kind, *how] = kind(system, self.solver, *how)
+        return known[kind, *how]
+
+
+def compiled_by_default() -> bool:
+    """Whether runs are compiled if nobody says otherwise: $POINTMASS_ENGINE, "compiled" or "reference"."""
+    named = os.environ.get("POINTMASS_ENGINE", "compiled")
+    if named not in ("compiled", "reference"):
+        raise InvalidInput(f"POINTMASS_ENGINE = {named!r} is not allowed: it must be 'compiled' or 'reference'")
+    return named == "compiled"
+
+
+def _taken(array: Array, rows: Rows | None) -> Array:
+    """Some rows of an array of shape (n, 3), flat: the array itself, if all are wanted."""
+    return array.reshape(-1) if rows is None else array[rows].reshape(-1)
+
+
+def _printable(force: Force) -> bool:
+    if not isinstance(force, (UnaryForce, ElementForce)):
+        return False
+    parts = [force.traced, *(c.value for p in force.parameters.values() for c in p.components)]
+    return not any(_calls(part.program) for part in parts if hasattr(part, "program")) and "age" not in _columns(force)
+
+
+def _columns(force: Force) -> set[str]:
+    return {name for p in force.parameters.values() for name in p.attributes}
+
+
+def _calls(program: Program) -> bool:
+    return any(program.nodes[i][0] == "call" for i in program.live())
+
+
+def _has_step(solver: Solver) -> bool:
+    return isinstance(solver, (ExplicitRungeKutta, Splitting)) and control_of(solver) is None
