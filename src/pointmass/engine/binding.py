@@ -12,11 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pointmass.engine import grids as grid_text
 from pointmass.engine.printing import statements
 from pointmass.laws.force import Force
+from pointmass.laws.grid import Grid, GridLookup
 from pointmass.laws.parameter import Component, Parameter
 from pointmass.particles import Particles
 from pointmass.tracing.columns import expanded
+from pointmass.tracing.program import Primitive
 from pointmass.tracing.trace import Traced, vector_names
 
 Array = NDArray[np.floating[Any]]
@@ -112,6 +115,36 @@ class Binder:
         self.numbers = Numbers()
         self.particle = columns
         self.attribute("w", "")
+        self._grids: list[Grid] = []
+        self._lookups: list[GridLookup] = []
+
+    @property
+    def arrays(self) -> list[str]:
+        """Names of the arrays that the laws read, in order: numbers, columns, and three for each grid."""
+        return ["P", self.particle.name, *(f"{name}{k}" for k in range(len(self._grids)) for name in "GHN")]
+
+    def data(self, length: int, order: NDArray[np.intp] | None) -> list[Any]:
+        """The arrays now; columns have one entry for each row of the kernel."""
+        dtype = self.particles.dtype
+        grids = [(g.table(dtype).ravel(), grid_text.numbers(g, dtype), grid_text.shape(g)) for g in self._grids]
+        columns = self.particle.array(length, dtype, order)
+        return [self.numbers.array(), columns, *(array for each in grids for array in each)]
+
+    @property
+    def functions(self) -> str:
+        """Text of the functions that the laws call."""
+        looks = "".join(grid_text.look_up(lookup, f"look{k}") for k, lookup in enumerate(self._lookups))
+        return grid_text.ALONG + looks if looks else ""
+
+    def call(self, primitive: Primitive, parts: list[str]) -> str:
+        """A call of a primitive."""
+        assert isinstance(primitive, GridLookup)
+        if primitive not in self._lookups:
+            self._lookups.append(primitive)
+        if primitive.grid not in self._grids:
+            self._grids.append(primitive.grid)
+        k = self._grids.index(primitive.grid)
+        return f"look{self._lookups.index(primitive)}({', '.join([*parts, f'G{k}', f'H{k}', f'N{k}'])})"
 
     def attribute(self, name: str, index: str) -> str:
         """A column of the particles."""
@@ -148,7 +181,7 @@ class Binder:
                 names[name] = expression
                 at_time += timed
                 lines += own
-        body, outputs = statements(program, names, f"{tag}_", self.dtype)
+        body, outputs = statements(program, names, f"{tag}_", self.dtype, self.call)
         return Text(at_time, lines + body, outputs)
 
     def selected(self, force: Force, index: str) -> str | None:

@@ -29,7 +29,6 @@ from pointmass.solvers.control import control_of
 from pointmass.solvers.explicit import ExplicitRungeKutta
 from pointmass.solvers.splitting import Splitting
 from pointmass.system import ParticleSystem
-from pointmass.tracing.program import Program
 
 Rows = NDArray[np.intp]
 LARGE = 4096  # particles of an island that is worth all threads
@@ -245,16 +244,11 @@ def _taken(array: Array, rows: Rows | None) -> Array:
 def _printable(force: Force) -> bool:
     if not isinstance(force, (UnaryForce, ElementForce)):
         return False
-    parts = [force.traced, *(c.value for p in force.parameters.values() for c in p.components)]
-    return not any(_calls(part.program) for part in parts if hasattr(part, "program")) and "age" not in _columns(force)
+    return "age" not in _columns(force)
 
 
 def _columns(force: Force) -> set[str]:
     return {name for p in force.parameters.values() for name in p.attributes}
-
-
-def _calls(program: Program) -> bool:
-    return any(program.nodes[i][0] == "call" for i in program.live())
 
 
 def _has_step(solver: Solver) -> bool:

@@ -70,7 +70,7 @@ class Deriv:
     @property
     def data(self) -> list[str]:
         """Names of the arrays of a kernel that are the same for all islands."""
-        return ["P", "C", *(a for family in self.families for a in family.arguments)]
+        return [*self.binder.arrays, *(a for family in self.families for a in family.arguments)]
 
     @property
     def call(self) -> str:
@@ -115,7 +115,7 @@ class Deriv:
             "    return status",
             "",
         ]
-        return "\n".join(lines)
+        return self.binder.functions + "\n".join(lines)
 
     def _elements(self, force: ElementForce, tag: str) -> tuple[list[str], list[str]]:
         """Statements that evaluate elements into their buffer, and those that add them up on a particle."""

@@ -183,7 +183,7 @@ class IslandMembers:
         """Advance positions and velocities, shape (3 * rows,), in place."""
         deriv, count = self.kernel.deriv, len(self.rows)
         dtype = self.kernel.system.particles.dtype
-        data: list[Any] = [deriv.binder.numbers.array(), deriv.binder.particle.array(count, dtype, self.order)]
+        data = deriv.binder.data(count, self.order)
         starts, most = [], [int(np.diff(self.first).max(initial=0))]
         for family, (elements, found) in zip(deriv.families, self.families, strict=True):
             data += [found.nodes, family.table.array(len(elements), dtype, elements), found.ends, found.entries]

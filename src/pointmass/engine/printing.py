@@ -6,11 +6,10 @@ selects, which vectorise; literals carry the precision of the kernel, so that no
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
 
 from pointmass.tracing.columns import INFIX
-from pointmass.tracing.program import Program, operands
+from pointmass.tracing.program import Primitive, Program, operands
 
 CALLS = {
     "sqrt": "np.sqrt({0})",
@@ -37,7 +36,12 @@ def literal(value: float, dtype: str) -> str:
     return f"({text})" if text.startswith("-") else text
 
 
-def statements(program: Program, names: Mapping[str, str], prefix: str, dtype: str) -> tuple[list[str], list[str]]:
+Call = Callable[[Primitive, list[str]], str]  # a call of a primitive as an expression
+
+
+def statements(
+    program: Program, names: Mapping[str, str], prefix: str, dtype: str, call: Call | None = None
+) -> tuple[list[str], list[str]]:
     """A program as assignments to local variables, and the expressions of its outputs.
 
     Parameters
@@ -46,6 +50,7 @@ def statements(program: Program, names: Mapping[str, str], prefix: str, dtype: s
     names : expression in the kernel of each input.
     prefix : of the local variables, which keeps several laws in one kernel apart.
     dtype : "float64" or "float32", the precision of every operation.
+    call : how primitives are called, where the program has any.
     """
     text: dict[int, str] = {}
     lines = []
@@ -57,17 +62,16 @@ def statements(program: Program, names: Mapping[str, str], prefix: str, dtype: s
             text[i] = names[rest[0]]
         else:
             text[i] = f"{prefix}{i}"
-            lines.append(f"{text[i]} = {_right(node, [text[o] for o in operands(node)])}")
+            parts = [text[o] for o in operands(node)]
+            if op == "call":
+                assert call is not None
+                right = call(rest[0], parts)
+            elif op in CALLS:
+                right = CALLS[op].format(*parts)
+            else:
+                right = f"{parts[0]} {INFIX[op]} {parts[1]}"
+            lines.append(f"{text[i]} = {right}")
     return lines, [text[o] for o in program.outputs]
-
-
-def _right(node: tuple[Any, ...], parts: list[str]) -> str:
-    op = node[0]
-    if op == "call":
-        return str(node[1].scalar(parts))
-    if op in CALLS:
-        return CALLS[op].format(*parts)
-    return f"{parts[0]} {INFIX[op]} {parts[1]}"
 
 
 def indented(lines: list[str], depth: int) -> list[str]:

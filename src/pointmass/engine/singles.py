@@ -106,7 +106,7 @@ class Motion:
     def __init__(self, system: ParticleSystem, solver: Solver) -> None:
         self.system, self.solver = system, solver
         self.forces = [force for force in system.forces if isinstance(force, UnaryForce)]
-        self.binder = Binder(system.particles, Lanes("s"), switches=not all(f.enabled for f in system.forces))
+        self.binder = Binder(system.particles, Lanes("C"), switches=not all(f.enabled for f in system.forces))
         self.dtype = self.binder.dtype
         self.at_time: list[str] = []
         self.lines: list[str] = [f"w = {self.binder.attribute('w', 'i')}"]
@@ -203,13 +203,13 @@ class SinglesKernel:
         parts = [self._lanes(u, [*motion.lines, *moves]) for u in unrolled]
         load = [f"s[{(6 + c) * W} + i] = C[{c}, lo + i]" for c in range(columns)]
         copies = [(f"{q}", 3 * W * k) for k, q in enumerate("xv" if self.system.order == 2 else "x")]
-        steps = []
+        steps, shared = [], ", ".join(self.shared)
         for u in unrolled:
             times = ", ".join(f"t0 + (k + {j}) * dt" for j in range(u + 1))
-            steps += [f"while k + {u} <= k0 + count:", f"    bad |= lanes{u}(s, P, {times})", f"    k += {u}"]
+            steps += [f"while k + {u} <= k0 + count:", f"    bad |= lanes{u}({shared}, {times})", f"    k += {u}"]
         run = [
             "@njit(parallel=True, **FLAGS)",
-            "def run(x, v, P, C, t0, dt, k0, count, status, reach):",
+            f"def run(x, v, {', '.join(motion.binder.arrays)}, t0, dt, k0, count, status, reach):",
             "    n = len(x) // 3",
             f"    for tile in prange((n + {W - 1}) // {W}):",
             f"        s = np.ones({(6 + columns) * W}, R)",
@@ -227,7 +227,7 @@ class SinglesKernel:
             *(f"        keep(s, {offset}, {q}, lo, m)" for q, offset in copies),
             "",
         ]
-        return "\n".join([TRANSPOSED, *(line for part in parts for line in part), *run])
+        return motion.binder.functions + "\n".join([TRANSPOSED, *(line for part in parts for line in part), *run])
 
     def _lanes(self, unrolled: int, step: list[str]) -> list[str]:
         """The function that makes a few steps of all lanes, with the state in registers in between."""
@@ -237,7 +237,7 @@ class SinglesKernel:
         steps = [line for j in range(unrolled) for line in (f"hr = h{j}", *step)]
         return [
             "@njit(**FLAGS)",
-            f"def lanes{unrolled}(s, P, {', '.join(times)}):",
+            f"def lanes{unrolled}({', '.join([*self.shared, *times])}):",
             *indented(motion.binder.numbers.lines(), 1),
             *(f"    h{j} = R(t{j + 1} - t{j})" for j in range(unrolled)),
             "    t = t0",
@@ -253,6 +253,11 @@ class SinglesKernel:
             "",
             "",
         ]
+
+    @property
+    def shared(self) -> list[str]:
+        """Arrays that the lanes read: the scratch holds the columns."""
+        return ["s", *(name for name in self.motion.binder.arrays if name != "C")]
 
     @property
     def state(self) -> list[tuple[str, str]]:
@@ -292,9 +297,9 @@ class SingleMembers:
         motion, count = self.kernel.motion, len(self.rows)
         particles = self.kernel.system.particles
         order = None if count == len(particles) else self.rows
-        columns = motion.binder.particle.array(count, particles.dtype, order)
+        data = motion.binder.data(count, order)
         tiles = -(-count // W)
         status, reach = np.zeros(tiles, np.int64), np.zeros((tiles, 2), x.dtype)
         grid = (span.t0, span.dt, span.first, span.count)
-        self.kernel.functions["run"](x, v, motion.binder.numbers.array(), columns, *grid, status, reach)
+        self.kernel.functions["run"](x, v, *data, *grid, status, reach)
         return not status.any(), reach.max(axis=0).astype(np.float64)
