@@ -10,7 +10,10 @@ import numpy as np
 from pointmass.errors import Diverged
 from pointmass.solvers.base import Array, Memory, Solver, Step, System
 from pointmass.solvers.islands import Islands, Mask, number_of, rms
+from pointmass.tracing import functions as fn
+from pointmass.tracing.functions import Number
 
+TINY = float(np.finfo(np.float64).tiny)
 CLOCK_ULPS = 16.0  # a step this many roundings of its clock long no longer moves it reliably
 
 
@@ -31,7 +34,8 @@ class PIController:
     -----
     Gustafsson, ACM Trans. Math. Softw. 17 (1991), 533; the constants are those of DOPRI5 in Hairer, Norsett and
     Wanner, Solving Ordinary Differential Equations I, sec. II.4 and IV.2. The memory has, for each island: `h_next`
-    [s] (0: not chosen yet), `error_old` and `rejected`.
+    [s] (0: not chosen yet), `error_old` and `rejected`. `scale`, `factor`, `retreat`, `short` and `first` are laws:
+    they take arrays or symbols, so that compiled kernels print the same text and round alike.
     """
 
     rtol: float
@@ -49,7 +53,7 @@ class PIController:
 
     def norm(self, error: Array, y0: Array, y1: Array, islands: Islands) -> Array:
         """Error over tolerance, root mean square of each island; NaN and infinity stay."""
-        return rms(error / self._scale(np.maximum(np.abs(y0), np.abs(y1))), islands, number_of(islands))
+        return rms(error / self.scale(np.maximum(np.abs(y0), np.abs(y1))), islands, number_of(islands))
 
     def judge(self, step: Step, h: Array, wanted: Array, islands: Islands, memory: Memory) -> tuple[Mask, Memory]:
         """Which islands keep the step, and what the control remembers of it.
@@ -65,11 +69,11 @@ class PIController:
         assert step.error is not None
         error = self.norm(step.error, step.y0, step.y1, islands)
         tried, accepted = h > 0.0, error <= 1.0  # NaN is not accepted
-        longer = h * self._factor(error, memory["error_old"])
+        longer = h * self.factor(error, memory["error_old"])
         longer = np.where(memory["rejected"], np.minimum(longer, h), longer)
         longer = np.where(h < wanted, np.maximum(longer, wanted), longer)
         new = {
-            "h_next": np.where(accepted, longer, h * self._retreat(error)),
+            "h_next": np.where(accepted, longer, h * self.retreat(error)),
             "error_old": np.where(accepted, np.maximum(error, self.floor), memory["error_old"]),
             "rejected": ~accepted,
         }
@@ -95,32 +99,44 @@ class PIController:
         beyond the time that is `left`, where forces may mean nothing.
         """
         islands = system.islands
-        n, scale = number_of(islands), self._scale(np.abs(y))
+        n, scale = number_of(islands), self.scale(np.abs(y))
         slope = system.deriv_eval(_common(t, islands), y)
         d0, d1 = rms(y / scale, islands, n), rms(slope / scale, islands, n)
-        short = np.where((d0 < 1e-5) | ~(d1 >= 1e-5), 1e-6, 0.01 * d0 / np.maximum(d1, 1e-5))
-        short = np.minimum(short, left)
+        short = self.short(d0, d1, left)
         there = system.deriv_eval(_common(t + short, islands), y + short[islands] * slope)
         d2 = rms((there - slope) / scale, islands, n) / short
-        bend = np.maximum(d1, d2)
-        flat = np.maximum(1e-6, short * 1e-3)
-        h = np.where(bend > 1e-15, (0.01 / np.maximum(bend, 1e-15)) ** (1.0 / self.order), flat)
-        result: Array = np.where(np.isfinite(h), np.minimum(100.0 * short, h), short)
+        result: Array = self.first(short, d1, d2)
         return result
 
-    def _scale(self, size: Array) -> Array:
-        result: Array = np.maximum(self.atol + self.rtol * size, np.finfo(np.float64).tiny)
-        return result
+    def scale(self, size: Number) -> Number:
+        """The tolerated error of a number of that size."""
+        return fn.maximum(self.atol + self.rtol * size, TINY)
 
-    def _factor(self, error: Array, before: Array) -> Array:
-        slow = error ** (1.0 / self.order - 0.75 * self.beta) / before**self.beta / self.safety
-        result: Array = 1.0 / np.clip(slow, 1.0 / self.grow, 1.0 / self.shrink)
-        return result
+    def factor(self, error: Number, before: Number) -> Number:
+        """How much longer the next step may be after one with this error over tolerance that was accepted."""
+        slow = fn.pow(error, self._exponent) / fn.pow(before, self.beta) / self.safety
+        return 1.0 / fn.minimum(fn.maximum(slow, 1.0 / self.grow), 1.0 / self.shrink)
 
-    def _retreat(self, error: Array) -> Array:
-        slow = error ** (1.0 / self.order - 0.75 * self.beta) / self.safety
-        result: Array = np.where(np.isfinite(slow), np.maximum(self.shrink, 1.0 / slow), self.shrink)
-        return result
+    def retreat(self, error: Number) -> Number:
+        """How much shorter the next trial must be after one with this error over tolerance that was rejected."""
+        slow = fn.pow(error, self._exponent) / self.safety
+        return fn.where(fn.absolute(slow) < np.inf, fn.maximum(self.shrink, 1.0 / slow), self.shrink)
+
+    def short(self, d0: Number, d1: Number, left: Number) -> Number:
+        """The step that shows the second derivative [s], from the sizes of y and y' over tolerance."""
+        step = fn.where(d0 < 1e-5, 1e-6, 0.01 * d0 / fn.maximum(d1, 1e-5))
+        return fn.minimum(fn.where(d1 >= 1e-5, step, 1e-6), left)
+
+    def first(self, short: Number, d1: Number, d2: Number) -> Number:
+        """The first step [s], from the sizes of y' and y'' over tolerance."""
+        bend = fn.maximum(d1, d2)
+        curved = fn.pow(0.01 / fn.maximum(bend, 1e-15), 1.0 / self.order)
+        h = fn.where(bend > 1e-15, curved, fn.maximum(1e-6, short * 1e-3))
+        return fn.where(fn.absolute(h) < np.inf, fn.minimum(100.0 * short, h), short)
+
+    @property
+    def _exponent(self) -> float:
+        return 1.0 / self.order - 0.75 * self.beta
 
 
 def control_of(solver: Solver) -> PIController | None:
