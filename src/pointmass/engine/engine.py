@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.engine.binding import kinds
-from pointmass.engine.island import IslandKernel, Span
+from pointmass.engine.island import IslandKernel, Outcome, Span
 from pointmass.engine.reference import ReferenceEngine
 from pointmass.engine.singles import SinglesKernel
 from pointmass.errors import InvalidInput
@@ -24,7 +24,7 @@ from pointmass.laws.force import Force
 from pointmass.laws.unary import UnaryForce
 from pointmass.particles import Array
 from pointmass.solvers.advance import Stats
-from pointmass.solvers.base import Solver
+from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.control import control_of
 from pointmass.solvers.explicit import ExplicitRungeKutta
 from pointmass.solvers.splitting import Splitting
@@ -39,14 +39,8 @@ LONGEST = 256  # steps of a span
 class Members(Protocol):
     """The particles of a group, with what their kernel needs to know of them."""
 
-    def run(self, x: Array, v: Array, births: Array | None, span: Span) -> tuple[bool, Array]:
-        """Advance positions and velocities, flat, in place.
-
-        Returns
-        -------
-        good, reach
-            Whether nothing went wrong, and the largest |x| and |v| at the end.
-        """
+    def run(self, x: Array, v: Array, births: Array | None, span: Span, memory: Memory) -> Outcome:
+        """Advance positions and velocities, flat, and what the solver remembers, in place."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,32 +128,34 @@ class Engine:
     def _seen(self, span: Span, births: Array | None) -> bool:
         """Make one step, and make it again on the reference path for all that a look inside it asks for."""
         system = self.system
-        before = system.get_state()
+        before, earlier = system.get_state(), self.reference.memory
         if not self._launch(span, births):
             return False
-        after, stats = system.get_state(), self.stats
+        after, memory, stats = system.get_state(), self.reference.memory, self.stats
         system.set_state(before, span.start)
+        self.reference.memory = earlier
         self.reference.step(span.start, span.end, None if births is None else np.maximum(births, span.start))
         system.set_state(after, span.end)
-        self.reference.stats = stats
+        self.reference.memory, self.reference.stats = memory, stats
         return True
 
     def _launch(self, span: Span, births: Array | None) -> bool:
         p = self.system.particles
-        top = np.zeros(2)
+        memory = self.reference.recall()
+        outcomes = []
         for group in self._grouped(births, span.start):
             x, v = _taken(p.x, group.rows), _taken(p.v, group.rows)
             clock = births if births is None or group.rows is None else births[group.rows]
-            good, reach = group.members.run(x, v, clock, span)
-            if not good:
+            outcomes.append(group.members.run(x, v, clock, span, memory))
+            if not outcomes[-1].good:
                 return False
             if group.rows is not None:
                 p.x[group.rows], p.v[group.rows] = x.reshape(-1, 3), v.reshape(-1, 3)
-            top = np.maximum(top, reach)
-        self.farthest, self.fastest = (float(t) for t in top)
-        evaluations = span.count * self.solver.evaluations
-        self.reference.stats = self.stats + Stats(steps=span.count, evaluations=evaluations)
+        self.farthest, self.fastest = np.max([o.reach for o in outcomes], axis=0).tolist()
+        works = [o.stats for o in outcomes]
+        work = Stats(max(w.steps for w in works), sum(w.rejected for w in works), max(w.evaluations for w in works))
         self.system.t = span.end
+        self.reference.remember(memory, work)
         return True
 
     def state_at(self, t: float) -> Array:
@@ -202,6 +198,7 @@ class Engine:
     def _made_groups(self, islands: Rows, newborn: NDArray[np.bool_] | None) -> list[Group]:
         size = np.bincount(islands)[islands]
         alone = size == 1 if newborn is None else (size == 1) & ~newborn
+        alone &= control_of(self.solver) is None
         groups = [self._group(SinglesKernel, np.flatnonzero(alone), islands)] if alone.any() else []
         large = size >= LARGE
         for island in np.unique(islands[large]):
@@ -252,4 +249,4 @@ def _columns(force: Force) -> set[str]:
 
 
 def _has_step(solver: Solver) -> bool:
-    return isinstance(solver, (ExplicitRungeKutta, Splitting)) and control_of(solver) is None
+    return isinstance(solver, (ExplicitRungeKutta, Splitting))

@@ -92,7 +92,8 @@ def look_up(lookup: GridLookup, name: str) -> str:
     for corner in product("01", repeat=4):
         weight = " * ".join(f"{axis}{side}" for axis, side in zip("txyz", corner, strict=True))
         j, a, b, c = (f"{index}{side}" for index, side in zip("jabc", corner, strict=True))
-        add = f"total = total + {weight} * G[((({j} * N[1] + {a}) * N[2] + {b}) * N[3] + {c}) * N[4] + {lookup.component}]"
+        point = f"(({j} * N[1] + {a}) * N[2] + {b}) * N[3] + {c}"
+        add = f"total = total + {weight} * G[({point}) * N[4] + {lookup.component}]"
         # An axis of one point has one neighbour: the other does not count, not even as 0 times a number.
         there = " and ".join(f"N[{k}] > 1" for k, side in enumerate(corner) if side == "1")
         sums += [f"if {there}:", f"    {add}"] if there else [add]

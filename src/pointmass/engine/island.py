@@ -14,15 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.engine import store
+from pointmass.engine.adaptive import control_text
 from pointmass.engine.forces import Deriv, Incidence, incidence
 from pointmass.engine.printing import indented
-from pointmass.engine.steps import step_text
-from pointmass.solvers.base import Solver
+from pointmass.engine.steps import StepText, step_text
+from pointmass.solvers.advance import NEARLY, Stats
+from pointmass.solvers.base import Memory, Solver
+from pointmass.solvers.control import control_of
 from pointmass.system import ParticleSystem
 
 CHUNKS = 256  # tasks that the islands are cut into, whatever the number of threads
-NOT_FINITE = 1  # status of an island
+NOT_FINITE, NO_STEP = 1, 4  # bits of the status of an island
 
+CONTROL = ("h_next", "error_old", "rejected")  # what the step control remembers of an island
 REACHED = '''@njit(**FLAGS)
 def reached(x, n):
     """Largest size of the first 3n numbers; infinite where one is not finite."""
@@ -64,6 +68,21 @@ class Span:
         return self.time(self.count)
 
 
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a kernel says of a group after a span.
+
+    Attributes
+    ----------
+    good : whether nothing went wrong.
+    reach : largest |x| [m] and |v| [m/s] of a component.
+    """
+
+    good: bool
+    reach: Array
+    stats: Stats
+
+
 class IslandKernel:
     """Advances a group of islands.
 
@@ -79,64 +98,111 @@ class IslandKernel:
         self.text = self._printed(parallel)
 
     def _printed(self, parallel: bool) -> str:
-        deriv, order = self.deriv, self.system.order
-        step = step_text(self.solver, order, self.dtype, deriv.loop, self.system.velocity_dependent)
+        deriv, control = self.deriv, control_of(self.solver)
+        step = step_text(self.solver, self.system.order, self.dtype, deriv.loop, self.system.velocity_dependent)
         work = [*step.work, "x1", "v1"]
-        call = f"deriv({deriv.call}, "
-        lines = [line.replace("DERIV(", call) for line in step.lines]
-        keep = ["x[q] = x1[q]"] + ["v[q] = v1[q] if C[0, base + q // 3] != 0 else R(0)"] * (order == 2)
-        advance = [
-            f"@njit({deriv.flags})",
-            f"def advance({deriv.call}, t, h, x, v, {', '.join(work)}):",
-            "    status = 0",
+        state = f"{deriv.call}, clock, end, x, v, {', '.join(work)}, control, done"
+        parts = [REACHED, deriv.text, "\n\n", self._slope()]
+        if control is not None:
+            parts.append(control_text(control, self.system.order, self.dtype, deriv.call))
+        return "".join([*parts, self._advance(step, state), self._run(work, state, parallel)])
+
+    def _slope(self) -> str:
+        """dy/dt, in two arrays: of x and of v (order 1: of x alone)."""
+        deriv = self.deriv
+        lines = [f"return deriv({deriv.call}, t, x, x, kx)"]
+        if self.system.order == 2:
+            lines = [
+                f"status = deriv({deriv.call}, t, x, v, kv)",
+                f"for q in {deriv.loop}(3 * n):",
+                "    kx[q] = v[q] if C[0, base + q // 3] != 0 else R(0)",
+                "return status",
+            ]
+        head = [f"@njit({deriv.flags})", f"def slope({deriv.call}, t, x, v, kx, kv):"]
+        return "\n".join([*head, *indented(lines, 1), "", "", ""])
+
+    def _advance(self, step: StepText, state: str) -> str:
+        """An island from its clock to the end of a step."""
+        deriv, second = self.deriv, self.system.order == 2
+        trial = [line.replace("SLOPE(", f"slope({deriv.call}, ") for line in step.lines]
+        keep = ["x[q] = x1[q]"] + ["v[q] = v1[q] if C[0, base + q // 3] != 0 else R(0)"] * second
+        wanted, judged = ["h = left", "last = True"], []
+        if step.error:
+            wanted = [
+                "if not control[0] > 0.0:",
+                f"    control[0] = first_step({deriv.call}, clock, left, x, v, kx0, kv0, tx, tv, kx1, kv1, ex, ev)",
+                "    done[1] += 2",
+                "wanted = control[0]",
+                f"last = wanted * {NEARLY!r} >= left",
+                "h = left if last else wanted",
+            ]
+            judged = [
+                *(line.replace("SLOPE(", f"slope({deriv.call}, ") for line in step.error),
+                "verdict = judge(rms(n, ex, ev), h, wanted, clock, end, control)",
+                "if verdict != 0:",
+                "    done[2] += 1",
+                f"    status |= {NO_STEP} if verdict == 2 else 0",
+                "    continue",
+            ]
+        lines = [
+            "status = 0",
+            "while clock < end and status == 0:",
+            "    left = end - clock",
+            *indented(wanted, 1),
             "    hr = R(h)",
-            *indented(lines, 1),
+            "    t = clock",
+            *indented(trial, 1),
+            "    done[0] += 1",
+            f"    done[1] += {step.evaluations}",
+            *indented(judged, 1),
             f"    for q in {deriv.loop}(3 * n):",
             *indented(keep, 2),
-            "    return status",
-            "",
-            "",
+            "    clock = end if last else clock + h",
+            "return status",
         ]
+        return "\n".join([f"@njit({deriv.flags})", f"def advance({state}):", *indented(lines, 1), "", "", ""])
+
+    def _run(self, work: list[str], state: str, parallel: bool) -> str:
+        """The kernel itself: the islands of a group over a span."""
+        deriv = self.deriv
         ranges = [f"s{f.number} = S{f.number}[island]" for f in deriv.families]
         ranges += [f"e{f.number} = S{f.number}[island + 1]" for f in deriv.families]
-        buffers = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{f.number + 1}], R)" for f in deriv.families]
-        scratch = [f"{name} = np.empty(3 * M[0], R)" for name in work]
-        starts = [f"S{f.number}" for f in deriv.families]
+        scratch = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{f.number + 1}], R)" for f in deriv.families]
+        scratch += [f"{name} = np.empty(3 * M[0], R)" for name in work]
+        call = state.replace(", x, v, ", ", xi, vi, ")
         island = [
             "base = first[island]",
             "n = first[island + 1] - base",
             *ranges,
             "xi = x[3 * base:3 * (base + n)]",
             "vi = v[3 * base:3 * (base + n)]",
+            "control = controls[island]",
+            "done = work[island]",
             "bad = 0",
             "for s in range(count):",
-            "    ta = t0 + (k0 + s) * dt",
-            "    tb = t0 + (k0 + s + 1) * dt",
-            "    if birth[island] >= tb or bad != 0:",
-            "        continue",
-            "    ta = max(ta, birth[island])",
-            f"    bad |= advance({deriv.call}, ta, tb - ta, xi, vi, {', '.join(work)})",
+            "    clock = max(t0 + (k0 + s) * dt, birth[island])",
+            "    end = t0 + (k0 + s + 1) * dt",
+            "    if clock < end and bad == 0:",
+            f"        bad = advance({call})",
             "far, fast = reached(xi, n), reached(vi, n)",
             f"status[island] = bad if far < np.inf and fast < np.inf else {NOT_FINITE}",
             "reach[island, 0] = far",
             "reach[island, 1] = fast",
         ]
-        name = f"def run(first, x, v, {', '.join([*deriv.data, *starts])}, M, birth, t0, dt, k0, count, status, reach):"
+        data = ", ".join([*deriv.data, *(f"S{f.number}" for f in deriv.families)])
+        head = f"def run(first, x, v, {data}, M, birth, t0, dt, k0, count, controls, work, status, reach):"
         if parallel:
-            body = ["island = 0", *buffers, *scratch, *island]
-            run = ["@njit(**FLAGS)", name, *indented(body, 1)]
-        else:
-            body = [
-                f"lo = chunk * islands // {CHUNKS}",
-                f"hi = (chunk + 1) * islands // {CHUNKS}",
-                "if lo < hi:",
-                *indented([*buffers, *scratch], 1),
-                "    for island in range(lo, hi):",
-                *indented(island, 2),
-            ]
-            run = ["@njit(parallel=True, **FLAGS)", name, "    islands = len(first) - 1"]
-            run += [f"    for chunk in prange({CHUNKS}):", *indented(body, 2)]
-        return f"{REACHED}{deriv.text}\n\n" + "\n".join([*advance, *run, ""])
+            return "\n".join(["@njit(**FLAGS)", head, *indented(["island = 0", *scratch, *island], 1), ""])
+        chunk = [
+            f"lo = chunk * islands // {CHUNKS}",
+            f"hi = (chunk + 1) * islands // {CHUNKS}",
+            "if lo < hi:",
+            *indented(scratch, 1),
+            "    for island in range(lo, hi):",
+            *indented(island, 2),
+        ]
+        loop = ["    islands = len(first) - 1", f"    for chunk in prange({CHUNKS}):"]
+        return "\n".join(["@njit(parallel=True, **FLAGS)", head, *loop, *indented(chunk, 2), ""])
 
     @property
     def title(self) -> str:
@@ -165,6 +231,7 @@ class IslandMembers:
 
     def __init__(self, kernel: IslandKernel, rows: Rows, labels: Rows) -> None:
         self.kernel, self.rows = kernel, rows
+        self.islands = labels[np.flatnonzero(np.diff(labels, prepend=-1))]
         self.first = np.append(np.flatnonzero(np.diff(labels, prepend=-1)), len(rows)).astype(np.int64)
         self.place = np.full(len(kernel.system.particles), -1, np.intp)
         self.place[rows] = np.arange(len(rows))
@@ -179,9 +246,9 @@ class IslandMembers:
         found = incidence(nodes[mine], self.place, self.first)
         return mine[found.order], found
 
-    def run(self, x: Array, v: Array, births: Array | None, span: Span) -> tuple[bool, Array]:
+    def run(self, x: Array, v: Array, births: Array | None, span: Span, memory: Memory) -> Outcome:
         """Advance positions and velocities, shape (3 * rows,), in place."""
-        deriv, count = self.kernel.deriv, len(self.rows)
+        deriv, count, islands = self.kernel.deriv, len(self.rows), len(self.islands)
         dtype = self.kernel.system.particles.dtype
         data = deriv.binder.data(count, self.order)
         starts, most = [], [int(np.diff(self.first).max(initial=0))]
@@ -189,9 +256,18 @@ class IslandMembers:
             data += [found.nodes, family.table.array(len(elements), dtype, elements), found.ends, found.entries]
             starts.append(found.start)
             most.append(int(np.diff(found.start).max(initial=0)))
-        islands = len(self.first) - 1
         begin = np.full(islands, -np.inf) if births is None else np.maximum.reduceat(births, self.first[:-1])
+        control, work = np.zeros((islands, len(CONTROL))), np.zeros((islands, 3), np.int64)
+        if CONTROL[0] in memory:
+            control[:] = np.stack([memory[name][self.islands] for name in CONTROL], axis=1)
         status, reach = np.zeros(islands, np.int64), np.zeros((islands, 2))
         grid = (span.t0, span.dt, span.first, span.count)
-        self.kernel.functions["run"](self.first, x, v, *data, *starts, np.array(most), begin, *grid, status, reach)
-        return not status.any(), reach.max(axis=0)
+        self.kernel.functions["run"](
+            self.first, x, v, *data, *starts, np.array(most), begin, *grid, control, work, status, reach
+        )
+        for name, column in zip(CONTROL, control.T, strict=True):
+            if name in memory:
+                memory[name][self.islands] = column
+        steps, evaluations = (int(w) for w in work[:, :2].max(axis=0))
+        stats = Stats(steps, int(work[:, 2].sum()), evaluations)
+        return Outcome(not status.any(), reach.max(axis=0), stats)

@@ -112,6 +112,19 @@ class ReferenceEngine:
         if self.memory:
             self._left = self._touchable()
 
+    def recall(self) -> Memory:
+        """A copy of what the solver remembers, for the particles as they are now."""
+        self._fit_memory()
+        memory = {**self.solver.start(self.system), **self.memory}
+        return {name: values.copy() for name, values in memory.items()}
+
+    def remember(self, memory: Memory, work: Stats) -> None:
+        """Go on from steps that somebody else made."""
+        self.memory, self.stats = memory, self.stats + work
+        self._ids, self._islands = self.system.particles.id, self.system.island_of_particle
+        if memory:
+            self._left = self._touchable()
+
     def state_at(self, t: float) -> Array:
         """State of the present particles at a time within the last step, shape (dim,); nothing is changed.
 

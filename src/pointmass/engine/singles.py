@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from pointmass.engine import store
 from pointmass.engine.binding import Binder, Table
 from pointmass.engine.forces import unary
-from pointmass.engine.island import NOT_FINITE, Span
+from pointmass.engine.island import NOT_FINITE, Outcome, Span
 from pointmass.engine.printing import indented, literal
 from pointmass.laws.unary import UnaryForce
-from pointmass.solvers.base import Solver
+from pointmass.solvers.advance import Stats
+from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.explicit import ExplicitRungeKutta
 from pointmass.solvers.splitting import Splitting
 from pointmass.system import ParticleSystem
@@ -114,7 +115,7 @@ class Motion:
         if self.pins:
             self.lines.append("free = w != 0")
         self.timed = False  # whether the laws depend on time
-        self._evaluations = 0
+        self.evaluations = 0
         if isinstance(solver, ExplicitRungeKutta):
             self._explicit(solver)
         else:
@@ -123,8 +124,8 @@ class Motion:
 
     def _deriv(self, time: str, x: str, v: str, result: str) -> None:
         """Accelerations (order 1: velocities) at a stage, whose locals begin with `x` and `v`."""
-        k = self._evaluations
-        self._evaluations += 1
+        k = self.evaluations
+        self.evaluations += 1
         self.at_time.append(f"s{k} = {time}")
         self.lines += [f"f_{a} = R(0)" for a in AXES]
         state = {f"{q}_{a}": f"{name}_{a}" for q, name in (("x", x), ("v", v)) for a in AXES}
@@ -292,7 +293,7 @@ class SingleMembers:
     kernel: SinglesKernel
     rows: Rows
 
-    def run(self, x: Array, v: Array, births: Array | None, span: Span) -> tuple[bool, Array]:
+    def run(self, x: Array, v: Array, births: Array | None, span: Span, memory: Memory) -> Outcome:
         """Advance positions and velocities, shape (3 * rows,), in place."""
         motion, count = self.kernel.motion, len(self.rows)
         particles = self.kernel.system.particles
@@ -302,4 +303,5 @@ class SingleMembers:
         status, reach = np.zeros(tiles, np.int64), np.zeros((tiles, 2), x.dtype)
         grid = (span.t0, span.dt, span.first, span.count)
         self.kernel.functions["run"](x, v, *data, *grid, status, reach)
-        return not status.any(), reach.max(axis=0).astype(np.float64)
+        work = Stats(span.count, 0, span.count * motion.evaluations)
+        return Outcome(not status.any(), reach.max(axis=0).astype(np.float64), work)

@@ -7,11 +7,12 @@ order as its class does on NumPy arrays.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from pointmass.engine.printing import indented, literal
+from pointmass.engine.printing import literal
 from pointmass.solvers.base import Solver
-from pointmass.solvers.explicit import ExplicitRungeKutta
+from pointmass.solvers.control import control_of
+from pointmass.solvers.explicit import EmbeddedRungeKutta, ExplicitRungeKutta
 from pointmass.solvers.splitting import Splitting
 
 
@@ -22,11 +23,15 @@ class StepText:
     Attributes
     ----------
     work : names of the arrays that it needs, each of length 3n.
-    lines : statements; `deriv(...)` is written DERIV(t, x, v, k).
+    lines : statements; the slopes dy/dt = (kx, kv) are written SLOPE(t, x, v, kx, kv).
+    evaluations : of the forces.
+    error : statements that put the error over tolerance into ex and ev, from methods that have one.
     """
 
     work: list[str]
     lines: list[str]
+    evaluations: int
+    error: list[str] = field(default_factory=list)
 
 
 def step_text(solver: Solver, order: int, dtype: str, loop: str, velocity_dependent: bool) -> StepText:
@@ -37,65 +42,60 @@ def step_text(solver: Solver, order: int, dtype: str, loop: str, velocity_depend
     return _splitting(solver, dtype, loop, velocity_dependent)
 
 
-def _weighted(weights: Sequence[float], names: Sequence[str], dtype: str) -> str:
-    """w1 k1[q] + w2 k2[q] + ..., without the terms whose weight is 0."""
-    return " + ".join(f"{literal(w, dtype)} * {k}[q]" for w, k in zip(weights, names, strict=False) if w)
+def _weighted(weights: Sequence[float], slopes: str, dtype: str) -> str:
+    """w0 k0[q] + w1 k1[q] + ..., without the terms whose weight is 0."""
+    return " + ".join(f"{literal(w, dtype)} * {slopes}{i}[q]" for i, w in enumerate(weights) if w)
 
 
 def _explicit(solver: ExplicitRungeKutta, order: int, dtype: str, loop: str) -> StepText:
-    stages = solver._stages
-    slopes = [f"ka{i}" for i in range(len(stages))]  # of v (order 1: of x)
-    rises = [f"kx{i}" for i in range(len(stages))]  # of x, for order 2
+    parts = [("x", "kx"), ("v", "kv")][:order]
     lines: list[str] = []
-    for i, (c, a) in enumerate(stages):
-        x, v = ("x", "v") if i == 0 else ("tx", "tv")
-        if order == 1:
-            v = x
+    for i, (c, a) in enumerate(solver._stages):
         if i:
             lines.append(f"for q in {loop}(3 * n):")
-            lines.append(f"    tx[q] = x[q] + hr * ({_weighted(a, rises if order == 2 else slopes, dtype)})")
-            if order == 2:
-                lines.append(f"    tv[q] = v[q] + hr * ({_weighted(a, slopes, dtype)})")
-        lines.append(f"status |= DERIV(t + {c!r} * h, {x}, {v}, {slopes[i]})")
-        if order == 2:
-            lines += [
-                f"for q in {loop}(3 * n):",
-                f"    {rises[i]}[q] = {v}[q] if C[0, base + q // 3] != 0 else R(0)",
-            ]
+            lines += [f"    t{y}[q] = {y}[q] + hr * ({_weighted(a, k, dtype)})" for y, k in parts]
+        x, v = ("x", "v") if i == 0 else ("tx", "tv")
+        lines.append(f"status |= SLOPE(t + {c!r} * h, {x}, {v}, kx{i}, kv{i})")
     lines.append(f"for q in {loop}(3 * n):")
-    if order == 2:
-        lines.append(f"    x1[q] = x[q] + hr * ({_weighted(solver._weights, rises, dtype)})")
-        lines.append(f"    v1[q] = v[q] + hr * ({_weighted(solver._weights, slopes, dtype)})")
-    else:
-        lines.append(f"    x1[q] = x[q] + hr * ({_weighted(solver._weights, slopes, dtype)})")
-    work = ["tx", *slopes] if order == 1 else ["tx", "tv", *slopes, *rises]
-    return StepText(work, lines)
+    lines += [f"    {y}1[q] = {y}[q] + hr * ({_weighted(solver._weights, k, dtype)})" for y, k in parts]
+    stages = len(solver._stages)
+    error: list[str] = []
+    if control_of(solver) is not None:
+        assert isinstance(solver, EmbeddedRungeKutta)
+        weights, stages = solver._error_weights, stages + 1
+        error = [f"status |= SLOPE(t + h, x1, v1, kx{stages - 1}, kv{stages - 1})", f"for q in {loop}(3 * n):"]
+        for y, k in parts:
+            size = f"maximum(abs({y}[q]), abs({y}1[q]))"
+            error.append(f"    e{y}[q] = (hr * ({_weighted(weights, k, dtype)})) / scale({size})")
+    work = [f"{k}{i}" for i in range(stages) for k in ("kx", "kv")] + ["tx", "tv"] + ["ex", "ev"] * bool(error)
+    return StepText(work, lines, stages, error)
 
 
 def _splitting(solver: Splitting, dtype: str, loop: str, velocity_dependent: bool) -> StepText:
-    lines = [f"for q in {loop}(3 * n):", "    x1[q] = x[q]", "    v1[q] = v[q]", "status |= DERIV(t, x, v, ka)"]
+    lines = [f"for q in {loop}(3 * n):", "    x1[q] = x[q]", "    v1[q] = v[q]", "status |= SLOPE(t, x, v, kx, kv)"]
     fresh = True
     for (opening, drift, closing), (before, after) in zip(solver.substeps, solver._times, strict=True):
         if not fresh:
-            lines.append(f"status |= DERIV(t + {before!r} * h, x1, v1, ka)")
+            lines.append(f"status |= SLOPE(t + {before!r} * h, x1, v1, kx, kv)")
         lines += [
             f"kick = {literal(opening, dtype)} * hr",
             f"drift = {literal(drift, dtype)} * hr",
             f"for q in {loop}(3 * n):",
-            "    v1[q] = v1[q] + kick * ka[q]",
+            "    v1[q] = v1[q] + kick * kv[q]",
             "    x1[q] = x1[q] + drift * (v1[q] if C[0, base + q // 3] != 0 else R(0))",
         ]
         fresh = closing != 0.0 and not velocity_dependent
         if closing != 0.0:
             lines += _closing(closing, after, solver.passes if velocity_dependent else 1, dtype, loop)
-    return StepText(["ka", "before"], lines)
+    evaluations = sum("SLOPE(" in line for line in lines)
+    return StepText(["kx", "kv", "before"], lines, evaluations)
 
 
 def _closing(closing: float, after: float, passes: int, dtype: str, loop: str) -> list[str]:
     kick = [
-        f"status |= DERIV(t + {after!r} * h, x1, v1, ka)",
+        f"status |= SLOPE(t + {after!r} * h, x1, v1, kx, kv)",
         f"for q in {loop}(3 * n):",
-        "    v1[q] = before[q] + kick * ka[q]",
+        "    v1[q] = before[q] + kick * kv[q]",
     ]
     lines = [f"kick = {literal(closing, dtype)} * hr", f"for q in {loop}(3 * n):", "    before[q] = v1[q]"]
-    return [*lines, *(kick if passes == 1 else [f"for _ in range({passes}):", *indented(kick, 1)])]
+    return [*lines, *(kick * passes)]
