@@ -1,7 +1,8 @@
-"""Says why the first picture on a machine takes long."""
+"""Says why the first frame, or the first picture, on a machine takes long."""
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,3 +28,25 @@ def compiling_said(quiet: bool) -> Iterator[None]:
 
     with install_listener("numba:compile", Once()):
         yield
+
+
+class Said(logging.Handler):
+    """Passes what the library says on to stderr, where a bar may be."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        print(f"pointmass: {record.getMessage()}", file=sys.stderr)
+
+
+@contextmanager
+def laws_said(quiet: bool) -> Iterator[None]:
+    """Say on stderr what the engine compiles meanwhile, because it is in no cache."""
+    logger, handler = logging.getLogger("pointmass"), Said()
+    before = logger.level
+    if not quiet:
+        logger.addHandler(handler)
+        logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(before)

@@ -27,6 +27,7 @@ COMMANDS = {  # module by name of the command, in the order of the help
     "check": "check",
     "export": "export",
     "new": "new",
+    "kernels": "kernels",
 }
 
 

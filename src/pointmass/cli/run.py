@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pointmass.cli.compiling import laws_said
 from pointmass.cli.main import stopped
 from pointmass.cli.options import RunOptions, as_json, default_output, load_scene, quiet, run_options
 from pointmass.cli.progress import progress
@@ -57,7 +58,7 @@ def simulate(scene: Scene, path: Path, report: Report, quiet: bool, *, overwrite
 
     check_target(path, overwrite)
     simulation = scene.simulation()
-    with progress("simulating", scene.frames, quiet) as tick:
+    with laws_said(quiet), progress("simulating", scene.frames, quiet) as tick:
 
         def count(frames: int) -> None:
             report.frames = frames

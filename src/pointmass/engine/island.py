@@ -1,7 +1,7 @@
 """The kernel that takes islands from step to step: everything that a system can do, island by island.
 
-It is printed twice from one text: in `many` a parallel loop takes islands, each by one thread; in `one` a single large
-island is worked on by all threads, loop by loop.
+It is printed in two forms from one text: threads take islands, each a whole one; or all threads work on a single large
+island, loop by loop.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from pointmass.engine.adaptive import control_text
 from pointmass.engine.forces import Deriv, Incidence, incidence
 from pointmass.engine.printing import indented
 from pointmass.engine.steps import StepText, step_text
+from pointmass.engine.threads import spread
 from pointmass.solvers.advance import NEARLY, Stats
 from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.control import control_of
 from pointmass.system import ParticleSystem
 
-CHUNKS = 256  # tasks that the islands are cut into, whatever the number of threads
+GRAIN = 256  # particles that are worth a thread
 NOT_FINITE, NO_STEP = 1, 4  # bits of the status of an island
 
 CONTROL = ("h_next", "error_old", "rejected")  # what the step control remembers of an island
@@ -105,7 +106,7 @@ class IslandKernel:
         parts = [REACHED, deriv.text, "\n\n", self._slope()]
         if control is not None:
             parts.append(control_text(control, self.system.order, self.dtype, deriv.call))
-        return "".join([*parts, self._advance(step, state), self._run(work, state, parallel)])
+        return "".join([*parts, self._advance(step, state), self._run(work, state)])
 
     def _slope(self) -> str:
         """dy/dt, in two arrays: of x and of v (order 1: of x alone)."""
@@ -162,7 +163,7 @@ class IslandKernel:
         ]
         return "\n".join([f"@njit({deriv.flags})", f"def advance({state}):", *indented(lines, 1), "", "", ""])
 
-    def _run(self, work: list[str], state: str, parallel: bool) -> str:
+    def _run(self, work: list[str], state: str) -> str:
         """The kernel itself: the islands of a group over a span."""
         deriv = self.deriv
         ranges = [f"s{f.number} = S{f.number}[island]" for f in deriv.families]
@@ -190,19 +191,10 @@ class IslandKernel:
             "reach[island, 1] = fast",
         ]
         data = ", ".join([*deriv.data, *(f"S{f.number}" for f in deriv.families)])
-        head = f"def run(first, x, v, {data}, M, birth, t0, dt, k0, count, controls, work, status, reach):"
-        if parallel:
-            return "\n".join(["@njit(**FLAGS)", head, *indented(["island = 0", *scratch, *island], 1), ""])
-        chunk = [
-            f"lo = chunk * islands // {CHUNKS}",
-            f"hi = (chunk + 1) * islands // {CHUNKS}",
-            "if lo < hi:",
-            *indented(scratch, 1),
-            "    for island in range(lo, hi):",
-            *indented(island, 2),
-        ]
-        loop = ["    islands = len(first) - 1", f"    for chunk in prange({CHUNKS}):"]
-        return "\n".join(["@njit(parallel=True, **FLAGS)", head, *loop, *indented(chunk, 2), ""])
+        grid = "birth, t0, dt, k0, count, controls, work, status, reach"
+        loop = [*scratch, "for island in range(lo, hi):", *indented(island, 1)]
+        head = ["@njit(**FLAGS)", f"def run(lo, hi, first, x, v, {data}, M, {grid}):"]
+        return "\n".join([*head, *indented(loop, 1), ""])
 
     @property
     def title(self) -> str:
@@ -262,9 +254,9 @@ class IslandMembers:
             control[:] = np.stack([memory[name][self.islands] for name in CONTROL], axis=1)
         status, reach = np.zeros(islands, np.int64), np.zeros((islands, 2))
         grid = (span.t0, span.dt, span.first, span.count)
-        self.kernel.functions["run"](
-            self.first, x, v, *data, *starts, np.array(most), begin, *grid, control, work, status, reach
-        )
+        arrays = (self.first, x, v, *data, *starts, np.array(most), begin, *grid, control, work, status, reach)
+        kernel = self.kernel.functions["run"]
+        spread(lambda lo, hi: kernel(lo, hi, *arrays), islands, max(1, GRAIN * islands // count))
         for name, column in zip(CONTROL, control.T, strict=True):
             if name in memory:
                 memory[name][self.islands] = column

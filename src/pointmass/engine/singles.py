@@ -19,6 +19,7 @@ from pointmass.engine.binding import Binder, Table
 from pointmass.engine.forces import unary
 from pointmass.engine.island import NOT_FINITE, Outcome, Span
 from pointmass.engine.printing import indented, literal
+from pointmass.engine.threads import spread
 from pointmass.laws.unary import UnaryForce
 from pointmass.solvers.advance import Stats
 from pointmass.solvers.base import Memory, Solver
@@ -28,6 +29,7 @@ from pointmass.system import ParticleSystem
 
 Array = NDArray[np.floating[Any]]
 Rows = NDArray[np.intp]
+GRAIN = 4  # tiles that are worth a thread
 W = 256  # lanes of a tile
 AXES = "xyz"
 UNROLLED = (4, 1)  # steps that a lane makes in registers
@@ -209,11 +211,11 @@ class SinglesKernel:
             times = ", ".join(f"t0 + (k + {j}) * dt" for j in range(u + 1))
             steps += [f"while k + {u} <= k0 + count:", f"    bad |= lanes{u}({shared}, {times})", f"    k += {u}"]
         run = [
-            "@njit(parallel=True, **FLAGS)",
-            f"def run(x, v, {', '.join(motion.binder.arrays)}, t0, dt, k0, count, status, reach):",
+            "@njit(**FLAGS)",
+            f"def run(first, last, x, v, {', '.join(motion.binder.arrays)}, t0, dt, k0, count, status, reach):",
             "    n = len(x) // 3",
-            f"    for tile in prange((n + {W - 1}) // {W}):",
-            f"        s = np.ones({(6 + columns) * W}, R)",
+            f"    s = np.ones({(6 + columns) * W}, R)",
+            "    for tile in range(first, last):",
             f"        lo = tile * {W}",
             f"        m = min({W}, n - lo)",
             *(f"        load(s, {offset}, {q}, lo, m)" for q, offset in copies),
@@ -302,6 +304,7 @@ class SingleMembers:
         tiles = -(-count // W)
         status, reach = np.zeros(tiles, np.int64), np.zeros((tiles, 2), x.dtype)
         grid = (span.t0, span.dt, span.first, span.count)
-        self.kernel.functions["run"](x, v, *data, *grid, status, reach)
+        kernel = self.kernel.functions["run"]
+        spread(lambda lo, hi: kernel(lo, hi, x, v, *data, *grid, status, reach), tiles, GRAIN)
         work = Stats(span.count, 0, span.count * motion.evaluations)
         return Outcome(not status.any(), reach.max(axis=0).astype(np.float64), work)

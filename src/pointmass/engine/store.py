@@ -7,8 +7,8 @@ may read.
 
 from __future__ import annotations
 
+import logging
 import os
-import re
 import sys
 import tempfile
 import threading
@@ -36,6 +36,7 @@ FLAGS = {{"error_model": "numpy", "cache": True, "nogil": True{fast}}}
 
 '''
 FAST = ', "fastmath": {"contract", "arcp"}'  # never those that assume that there is no NaN, or reorder sums
+LOGGER = logging.getLogger("pointmass")  # says at level INFO what is compiled
 LOADED: dict[str, ModuleType] = {}
 LOCK = threading.RLock()
 
@@ -69,7 +70,10 @@ def load(title: str, text: str, dtype: str) -> ModuleType:
     key = sha256((source + _surroundings()).encode()).hexdigest()[:20]
     with LOCK:
         if key not in LOADED:
-            LOADED[key] = _import(f"pointmass_kernel_{key}", _written(key, source))
+            path = _written(key, source)
+            if not any((path.parent / "__pycache__").glob(f"{key}.*.nbc")):
+                LOGGER.info("compiling %s (once per machine)...", title)
+            LOADED[key] = _import(f"pointmass_kernel_{key}", path)
         return LOADED[key]
 
 
@@ -148,12 +152,9 @@ def _import(name: str, path: Path) -> ModuleType:
     spec = spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
+    # Threads that spin while they wait slow each other down where there are more of them than cores.
+    os.environ.setdefault("GOMP_SPINCOUNT", "1000")
     module = module_from_spec(spec)
     sys.modules[name] = module  # Numba looks functions up by the name of their module
     spec.loader.exec_module(module)
     return module
-
-
-def is_kernel(module: str) -> bool:
-    """Whether a module is one of ours: for those who say that it is being compiled."""
-    return re.fullmatch(r"pointmass_kernel_[0-9a-f]{20}", module) is not None

@@ -1,0 +1,240 @@
+"""Compiled spans against the reference path, step by step: the same bits for single particles and small islands."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pointmass as pm
+from pointmass.engine.engine import Engine
+from pointmass.engine.island import Span
+from pointmass.engine.reference import ReferenceEngine
+from pointmass.forces import FORCES
+from pointmass.solvers import SOLVERS
+
+DT = 1 / 64
+GRID = np.random.default_rng(4).standard_normal((3, 3, 4, 1, 3))
+PLACE = {"origin": (-1, -1, -1), "spacing": (0.7, 0.6, 0.9)}
+
+
+@pm.unary_force
+def own(x, v, m, t, strength=0.7, axis=(0.0, 1.0, 0.0)):
+    """A law of a user's own, with every function that laws may call."""
+    pull = pm.where(x[0] > 0, pm.exp(-x[0] * x[0]), pm.log(2 - x[0]))
+    turn = pm.cross(axis, v)
+    return (
+        pull + strength * turn[0],
+        pm.absolute(pm.atan2(x[1], 1.5)) ** 1.3 + turn[1],
+        pm.sin(3 * t) * pm.minimum(m, 1.0) + turn[2],
+    )
+
+
+@pm.element_force(3)
+def corner(x1, v1, x2, v2, x3, v3, t, k=2.0):
+    """Three particles that like to be on a line."""
+    d = x1 - 2.0 * x2 + x3
+    return -k * d, 2.0 * k * d, -k * d
+
+
+LAWS: dict[str, list[Callable[[], pm.Force]]] = {
+    "gravity": [lambda: pm.Gravity(("sin(t)", -9.81, "charge"))],
+    "drag": [
+        lambda: pm.Drag("0.3*charge"),
+        lambda: pm.Drag(np.linspace(0.1, 0.8, 8)),
+        lambda: pm.Drag(lambda t: 1 + t),
+    ],
+    "quadratic_drag": [lambda: pm.QuadraticDrag(0.4, on=[0, 2, 5])],
+    "attractor": [lambda: pm.Attractor(2.0, center=lambda t: (t, t * t, 0.0), eps=0.3)],
+    "harmonic": [lambda: pm.Harmonic(4.0, center=("cos(t)", 0, 1), k_d=0.2)],
+    "magnetic": [lambda: pm.Magnetic((0.1, 0.2, 1.0))],
+    "wind": [lambda: pm.Wind(("3*sin(t)", 0, 0)), lambda: pm.Wind(pm.Vortex(2.0, eps=0.2))],
+    "field": [
+        lambda: pm.Field(("-k*x", "sin(t)*y", "-z**3"), constants={"k": 2.0}),
+        lambda: pm.Field(potential="0.5*k*x**2 + charge*y", constants={"k": 2.0}),
+        lambda: pm.Field(grid=pm.Grid(GRID, times=[0, 0.1, 0.2], outside="zero", **PLACE)),
+        lambda: pm.Field(grid=pm.Grid(GRID[0], outside="wrap", **PLACE), scale="1 + t"),
+    ],
+    "springs": [
+        lambda: pm.Springs([(0, 1), (1, 2), (5, 2), (6, 7)], 20.0, [0.5, 0.1, 0.2, 0.3], rest="1 + 0.2*sin(9*t)")
+    ],
+    "angles": [lambda: pm.Angles([(0, 1, 2), (2, 5, 1)], 2.0, 0.1, rest=0.5)],
+    "own": [lambda: own(strength="charge"), lambda: corner(elements=[(0, 1, 2), (5, 6, 7)])],
+    "flow": [
+        lambda: pm.Flow(("-y", "x + 0.2*sin(t)", "0")),
+        lambda: pm.Flow(grid=pm.Grid(GRID[0], outside="clamp", **PLACE)),
+    ],
+    "vortex": [lambda: pm.Vortex(2.0, eps=0.3)],
+}
+NOT_YET = {"gravitation", "point_vortices", "array_force"}  # pairs
+SOLVERS_OF = {
+    name: [kind()] + ([kind(adaptive=False)] if name in ("bs32", "dopri5") else []) for name, kind in SOLVERS.items()
+}
+READY = [s for several in SOLVERS_OF.values() for s in several if not s.implicit]
+CASES = [pytest.param(make, id=f"{name}-{k}") for name, several in LAWS.items() for k, make in enumerate(several)]
+
+
+def cloud(dtype: Any = np.float64, seed: int = 7) -> pm.Particles:
+    rng = np.random.default_rng(seed)
+    x, v = rng.uniform(-1, 1, (8, 3)), rng.uniform(-1, 1, (8, 3))
+    particles = pm.Particles(x, v, rng.uniform(0.5, 2, 8), charge=rng.uniform(0.5, 1.5, 8), dtype=dtype)
+    particles.pin([4])
+    return particles
+
+
+def system(*forces: Callable[[], pm.Force], **options: Any) -> pm.ParticleSystem:
+    return pm.ParticleSystem(cloud(**options), [make() for make in forces])
+
+
+def both(make: Callable[[], pm.ParticleSystem], solver: Any, steps: int, cuts: tuple[int, ...] = ()) -> list[Any]:
+    """The system after steps on the reference path, and after spans of kernels."""
+    slow, fast = make(), make()
+    reference = ReferenceEngine(slow, solver)
+    for k in range(steps):
+        reference.step(k * DT, (k + 1) * DT)
+    engine = Engine(fast, solver, wanted=True)
+    assert engine.compiled, engine.missing()
+    for a, b in itertools.pairwise((0, *cuts, steps)):
+        assert engine.run(Span(0.0, DT, a, b - a), None, look_inside=False)
+    return [slow, fast]
+
+
+def same(a: pm.ParticleSystem, b: pm.ParticleSystem) -> None:
+    np.testing.assert_array_equal(a.particles.x, b.particles.x)
+    np.testing.assert_array_equal(a.particles.v, b.particles.v)
+
+
+def test_every_force_has_a_kernel_or_a_reason() -> None:
+    assert set(FORCES) - NOT_YET == set(LAWS) - {"own"}
+
+
+@pytest.mark.usefixtures("plain")
+@pytest.mark.parametrize("solver", READY, ids=repr)
+@pytest.mark.parametrize("law", CASES)
+def test_every_law_under_every_solver(law: Callable[[], pm.Force], solver: Any) -> None:
+    if law().order == 1 and solver.name in ("symplectic_euler", "leapfrog", "yoshida4"):
+        pytest.skip("the method is for x'' = f/m")
+    same(*both(lambda: system(law), solver, steps=3, cuts=(1,)))
+
+
+PAIRWISE = [  # every law and every solver once, compiled
+    (("gravity", "springs", "own"), "symplectic_euler", np.float64),
+    (("drag", "attractor", "magnetic"), "rk4", np.float64),
+    (("harmonic", "angles", "field"), "leapfrog", np.float64),
+    (("wind", "quadratic_drag", "springs"), "dopri5", np.float64),
+    (("flow", "vortex"), "bs32", np.float64),
+    (("gravity", "drag", "field"), "yoshida4", np.float32),
+    (("springs", "own"), "midpoint", np.float32),
+]
+
+
+@pytest.mark.parametrize(("laws", "name", "dtype"), PAIRWISE)
+def test_compiled(laws: tuple[str, ...], name: str, dtype: Any) -> None:
+    makers = [make for law in laws for make in LAWS[law]]
+    slow, fast = both(lambda: system(*makers, dtype=dtype), SOLVERS[name](), steps=100, cuts=(7, 64))
+    if dtype == np.float64:
+        same(slow, fast)
+    else:
+        np.testing.assert_allclose(fast.particles.x, slow.particles.x, rtol=1e-3, atol=1e-3)
+        assert fast.particles.x.dtype == np.float32
+
+
+def large(n: int = 1000) -> pm.ParticleSystem:
+    """Single particles, and chains of three, in an order that mixes them."""
+    rng = np.random.default_rng(3)
+    particles = pm.Particles(rng.uniform(-1, 1, (n, 3)), rng.uniform(-1, 1, (n, 3)))
+    links = rng.permutation(n)[: 3 * (n // 9)].reshape(-1, 3)
+    springs = pm.Springs(np.concatenate([links[:, :2], links[:, 1:]]), 30.0, 0.2, rest=0.5)
+    return pm.ParticleSystem(particles, [pm.Gravity(), pm.Drag(0.1), springs])
+
+
+def test_batches_of_any_size_and_any_order_of_islands() -> None:
+    whole = both(large, pm.SymplecticEuler(), steps=20)
+    same(*whole)
+    rows = np.random.default_rng(5).permutation(1000)[:400]
+    some = large()
+    keep = np.zeros(1000, bool)
+    islands = some.island_of_particle
+    keep[np.isin(islands, islands[rows])] = True
+    some.remove(~keep)
+    sim = pm.Simulation(some, pm.SymplecticEuler(), DT, compiled=True)
+    sim.step(20)
+    np.testing.assert_array_equal(some.particles.x, whole[1].particles.x[keep])
+
+
+def test_a_knob_compiles_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    sim = pm.Simulation(system(*LAWS["harmonic"], *LAWS["quadratic_drag"]), dt=DT, compiled=True)
+    sim.step(3)
+    from pointmass.engine import store
+
+    monkeypatch.setattr(store, "load", lambda *text: pytest.fail("a kernel was made"))
+    harmonic, drag = sim.system.forces
+    before = sim.system.particles.x.copy()
+    harmonic.set(k_s=9.0)
+    drag.set(c=3.0)
+    sim.step(3)
+    slow = pm.Simulation(system(*LAWS["harmonic"], *LAWS["quadratic_drag"]), dt=DT)
+    slow.step(3)
+    np.testing.assert_array_equal(slow.system.particles.x, before)
+    slow.system.forces[0].set(k_s=9.0)
+    slow.system.forces[1].set(c=3.0)
+    slow.step(3)
+    same(slow.system, sim.system)
+
+
+def test_a_force_is_switched_off_and_on() -> None:
+    sims = [pm.Simulation(system(*LAWS["springs"], *LAWS["gravity"]), dt=DT, compiled=c) for c in (False, True)]
+    for sim in sims:
+        sim.step(2)
+        sim.system.forces[0].enabled = False
+        sim.step(2)
+        sim.system.forces[0].enabled = True
+        sim.system.forces[1].enabled = False
+        sim.step(2)
+    same(*(sim.system for sim in sims))
+
+
+def test_births_and_deaths_and_frames_between_steps() -> None:
+    def run(compiled: bool) -> list[pm.Frame]:
+        start = pm.ParticleSystem(pm.Particles(np.zeros((0, 3))), [pm.Gravity(), pm.Drag(0.01)])
+        nozzle = pm.Nozzle(rate=300, speed=3, lifetime=0.3, lifetime_range=0.2)
+        sim = pm.Simulation(start, pm.RK4(), 1 / 100, emitters=[nozzle], compiled=compiled)
+        return list(sim.frames(12, fps=24))
+
+    for slow, fast in zip(run(False), run(True), strict=True):
+        np.testing.assert_array_equal(slow.ids, fast.ids)
+        np.testing.assert_array_equal(slow.positions, fast.positions)
+        np.testing.assert_array_equal(slow.velocities, fast.velocities)
+
+
+def test_divergence_is_explained_as_on_the_reference_path() -> None:
+    def run(compiled: bool) -> tuple[str, int, Any]:
+        chain = pm.chain(6)
+        stiff = pm.ParticleSystem(chain.particles, [pm.Gravity(), pm.Springs([(k, k + 1) for k in range(5)], 1e5)])
+        sim = pm.Simulation(stiff, pm.RK4(), 1 / 50, compiled=compiled)
+        with pytest.raises(pm.Diverged) as caught:
+            sim.step(5000)
+        return str(caught.value), sim.steps, stiff.particles.x
+
+    slow, fast = run(False), run(True)
+    assert slow[:2] == fast[:2]
+    np.testing.assert_array_equal(slow[2], fast[2])
+
+
+def test_a_parameter_that_is_no_longer_allowed_says_when() -> None:
+    sim = pm.Simulation(system(lambda: pm.Drag("0.1 - t")), dt=DT, compiled=True)
+    with pytest.raises(pm.InvalidInput, match=r"at t = 0\.1"):
+        sim.step(100)
+    assert 0 < sim.steps < 10
+
+
+def test_age_is_the_same_in_spans() -> None:
+    one, many = (pm.Simulation(system(*LAWS["gravity"]), dt=0.01, compiled=True) for _ in range(2))
+    one.step(7)
+    for _ in range(7):
+        many.step()
+    same(one.system, many.system)
+    np.testing.assert_array_equal(one.system.particles.age, many.system.particles.age)
