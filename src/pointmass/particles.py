@@ -145,7 +145,9 @@ class Particles:
 
     @property
     def w(self) -> Array:
-        return _read_only(np.where(self._held, 0, 1 / self.m).astype(self.dtype))
+        w: Array = 1 / self.m
+        w[self._held] = 0
+        return _read_only(w)
 
     def add(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -12,8 +13,10 @@ from numpy.typing import NDArray
 from pointmass.emitters.emitter import Birth, Emitter
 from pointmass.engine.engine import Engine, compiled_by_default
 from pointmass.engine.island import Span
+from pointmass.engine.threads import spread
 from pointmass.errors import Diverged, InvalidInput, number, shown, whole_number
 from pointmass.frame import Frame
+from pointmass.laws.arrays import ArrayForce
 from pointmass.look import Look, Stage
 from pointmass.particles import Array
 from pointmass.solvers import as_solver
@@ -25,6 +28,7 @@ from pointmass.system import ParticleSystem
 DEFAULT_DT = 1 / 240  # 60 frames a second with 4 substeps
 RUNAWAY = 1e6  # times the speeds seen so far that are explained: somebody this fast is looked at
 AGREE = 0.1  # of a speed: a step and two half steps that differ by more follow no motion
+AGED_AT_ONCE = 2**17  # particles whose ages stay in the cache
 ON_GRID = 1e-9  # of a step: a frame this near to the grid is on it
 
 
@@ -89,6 +93,8 @@ class Simulation:
         self.steps = 0
         self.frames_seen = 0
         self.engine = Engine(system, self.solver, compiled_by_default() if compiled is None else compiled)
+        if self.engine.wanted:
+            _warn_of_slow(system)
         self._start = system.get_state()
         self._stage = Stage(self.look, system.particles.x)
         self._looks = self.t0, 0, 1.0  # time of a frame, how many were looked at from it on, and how many in a second
@@ -114,6 +120,13 @@ class Simulation:
         end = self.steps + whole_number("count", count, at_least=0)
         while self.steps < end:
             self._advance(end - self.steps)
+
+    def prepare(self) -> None:
+        """Compile what the run needs, and change nothing; the first step would do it otherwise.
+
+        A thread may prepare a copy of a simulation, with other forces, while this one runs.
+        """
+        self.engine.prepare()
 
     def run(self, seconds: float) -> None:
         """Make the steps that it takes to come `seconds` [s] further; the last one may end a little later.
@@ -250,10 +263,16 @@ class Simulation:
 
     def _age(self, span: Span, clock: Array | None) -> None:
         age = self.system.particles.age
-        for k in range(span.count):
-            start, end = span.time(k), span.time(k + 1)
-            lived = end - (start if clock is None else np.clip(clock, start, end))
-            age += np.asarray(lived, age.dtype)
+
+        def grow(lo: int, hi: int) -> None:
+            for start in range(lo, hi, AGED_AT_ONCE):
+                rows = slice(start, min(start + AGED_AT_ONCE, hi))
+                for k in range(span.count):
+                    t0, t1 = span.time(k), span.time(k + 1)
+                    lived = t1 - (t0 if clock is None else np.clip(clock[rows], t0, t1))
+                    age[rows] += np.asarray(lived, age.dtype)
+
+        spread(grow, len(age), AGED_AT_ONCE)
 
     def _bury(self, born: Sequence[tuple[int, Birth]], t1: float) -> None:
         """Take away those whose time has come by t1."""
@@ -377,6 +396,16 @@ class Simulation:
             return None
         finally:
             system.set_state(now)
+
+
+def _warn_of_slow(system: ParticleSystem) -> None:
+    for force in system.forces:
+        if isinstance(force, ArrayForce):
+            warnings.warn(
+                f"{force.called} is a NumPy function, so this run is not compiled: a law (pm.unary_force, "
+                "pm.spring_force) would run at the speed of the machine",
+                stacklevel=3,
+            )
 
 
 def culprit(system: ParticleSystem) -> tuple[int, str, bool, list[int]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import pointmass as pm
+from pointmass.engine import store
 from pointmass.engine.engine import Engine
 from pointmass.engine.island import Span
 from pointmass.engine.reference import ReferenceEngine
@@ -168,8 +170,6 @@ def test_batches_of_any_size_and_any_order_of_islands() -> None:
 def test_a_knob_compiles_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     sim = pm.Simulation(system(*LAWS["harmonic"], *LAWS["quadratic_drag"]), dt=DT, compiled=True)
     sim.step(3)
-    from pointmass.engine import store
-
     monkeypatch.setattr(store, "load", lambda *text: pytest.fail("a kernel was made"))
     harmonic, drag = sim.system.forces
     before = sim.system.particles.x.copy()
@@ -238,3 +238,38 @@ def test_age_is_the_same_in_spans() -> None:
         many.step()
     same(one.system, many.system)
     np.testing.assert_array_equal(one.system.particles.age, many.system.particles.age)
+
+
+def test_laws_that_read_the_age() -> None:
+    slow, fast = (
+        pm.Simulation(system(lambda: pm.Drag("0.1 + age")), pm.RK4(), DT, compiled=compiled)
+        for compiled in (False, True)
+    )
+    slow.step(5)
+    fast.step(5)
+    assert fast.engine.compiled
+    same(slow.system, fast.system)
+
+
+def test_a_numpy_force_runs_and_says_that_it_is_slow() -> None:
+    force = pm.array_force(lambda x, v, m, t: -x)
+    with pytest.warns(UserWarning, match="is a NumPy function, so this run is not compiled"):
+        sim = pm.Simulation(pm.ParticleSystem(cloud(), [force]), dt=DT, compiled=True)
+    assert not sim.engine.compiled
+    sim.step(3)
+    assert sim.steps == 3
+
+
+def test_a_copy_is_prepared_in_a_thread_while_the_run_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    running = pm.Simulation(system(*LAWS["gravity"]), dt=DT, compiled=True)
+    other = pm.Simulation(system(*LAWS["gravity"], lambda: pm.Drag(0.2)), dt=DT, compiled=True)
+    before = other.system.particles.x.copy()
+    thread = threading.Thread(target=other.prepare)
+    thread.start()
+    while thread.is_alive():
+        running.step(4)
+    np.testing.assert_array_equal(other.system.particles.x, before)
+    monkeypatch.setattr(store, "load", lambda *text: pytest.fail("a kernel was made"))
+    other.step(3)
+    assert running.steps > 0
+    assert other.steps == 3

@@ -39,6 +39,7 @@ class Table:
     name: str
     getters: list[Callable[[], Array]] = field(default_factory=list)
     _known: dict[str, int] = field(default_factory=dict)
+    _last: Array | None = None  # its memory is used again
 
     def column(self, key: str, get: Callable[[], Array], index: str) -> str:
         """The entry of a column as an expression; a column with a key that is known is shared."""
@@ -53,11 +54,12 @@ class Table:
 
     def array(self, length: int, dtype: Any, order: NDArray[np.intp] | None) -> Array:
         """All columns now, in the order of the kernel's rows."""
-        result = np.empty((len(self.getters), length), dtype)
-        for row, get in zip(result, self.getters, strict=True):
+        if self._last is None or self._last.shape[1] != length:
+            self._last = np.empty((len(self.getters), length), dtype)
+        for row, get in zip(self._last, self.getters, strict=True):
             values = get()
             row[:] = values if order is None else values[order]
-        return result
+        return self._last
 
 
 @dataclass

@@ -18,9 +18,9 @@ from pointmass.engine.binding import kinds
 from pointmass.engine.island import IslandKernel, Outcome, Span
 from pointmass.engine.reference import ReferenceEngine
 from pointmass.engine.singles import SinglesKernel
+from pointmass.engine.threads import spread
 from pointmass.errors import InvalidInput
 from pointmass.laws.elements import ElementForce
-from pointmass.laws.force import Force
 from pointmass.laws.unary import UnaryForce
 from pointmass.particles import Array
 from pointmass.solvers.advance import Stats
@@ -31,6 +31,7 @@ from pointmass.solvers.splitting import Splitting
 from pointmass.system import ParticleSystem
 
 Rows = NDArray[np.intp]
+GRAIN = 2**16  # rows that are worth a thread
 LARGE = 4096  # particles of an island that is worth all threads
 WORK = 1e9  # particle-steps between two returns to Python: so long Ctrl-C waits
 LONGEST = 256  # steps of a span
@@ -95,14 +96,28 @@ class Engine:
         """What of the system has no kernel."""
         system = self.system
         return [
-            *(force.name for force in system.forces if not _printable(force)),
+            *(force.name for force in system.forces if not isinstance(force, (UnaryForce, ElementForce))),
             *(collider.name for collider in system.colliders),
             *([] if _has_step(self.solver) else [self.solver.name]),
         ]
 
     def longest(self) -> int:
         """How many steps a span may have."""
+        if any("age" in p.attributes for force in self.system.forces for p in force.parameters.values()):
+            return 1  # ages grow between spans
         return int(np.clip(WORK / max(1, len(self.system.particles)), 1, LONGEST))
+
+    def prepare(self) -> None:
+        """Compile what the system needs, and change nothing.
+
+        Kernels are shared by all systems of the same make, so another thread may prepare a copy of a system while this
+        one runs.
+        """
+        p, memory = self.system.particles, self.reference.recall()
+        nothing = Span(self.system.t, 1.0, 0, 0)
+        for group in self._grouped(None, nothing.start) if self.compiled else []:
+            x, v = (_taken(array, group.rows).copy() for array in (p.x, p.v))
+            group.members.run(x, v, None, nothing, memory)
 
     @property
     def coupled(self) -> bool:
@@ -119,7 +134,11 @@ class Engine:
         look_inside : whether `state_at` will be asked for a time within the last step.
         """
         p = self.system.particles
-        self._before, self._looked = (p.x.copy(), p.v.copy()), not look_inside
+        if self._before is None or self._before[0].shape != p.x.shape:
+            self._before = np.empty_like(p.x), np.empty_like(p.v)
+        for kept, array in zip(self._before, (p.x, p.v), strict=True):
+            _copied(kept, array)
+        self._looked = not look_inside
         if look_inside and span.count > 1:
             whole = self._launch(replace(span, count=span.count - 1), births)
             return whole and self._seen(replace(span, first=span.first + span.count - 1, count=1), births)
@@ -238,14 +257,13 @@ def _taken(array: Array, rows: Rows | None) -> Array:
     return array.reshape(-1) if rows is None else array[rows].reshape(-1)
 
 
-def _printable(force: Force) -> bool:
-    if not isinstance(force, (UnaryForce, ElementForce)):
-        return False
-    return "age" not in _columns(force)
+def _copied(target: Array, source: Array) -> None:
+    """Copy rows by several threads."""
 
+    def copy(lo: int, hi: int) -> None:
+        target[lo:hi] = source[lo:hi]
 
-def _columns(force: Force) -> set[str]:
-    return {name for p in force.parameters.values() for name in p.attributes}
+    spread(copy, len(source), GRAIN)
 
 
 def _has_step(solver: Solver) -> bool:

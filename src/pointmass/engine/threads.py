@@ -16,7 +16,7 @@ PIECES = 8  # for each thread, so that one who is late does not keep all waiting
 
 
 def spread(work: Callable[[int, int], object], count: int, grain: int) -> None:
-    """Call `work(first, last)` on pieces of range(count), of at least `grain` items, by as many threads as Numba has."""
+    """Call `work(first, last)` on pieces of range(count), each of `grain` items or more, by the threads of Numba."""
     import numba
 
     threads = numba.get_num_threads()
