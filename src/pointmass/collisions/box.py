@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, Contact, directions, lengths
+from pointmass.collisions.collider import Array, Collider, Contact
+from pointmass.collisions.laws import along
 from pointmass.collisions.plane import Plane
 from pointmass.errors import InvalidInput, finite_array
-from pointmass.laws.parameter import Vector
+from pointmass.laws import parameter
+from pointmass.tracing.functions import Number, Triple, absolute, length, maximum, minimum, where
+from pointmass.tracing.program import Vector
 
 FACES = [  # two triangles for each face, counter-clockwise seen from outside
     *([0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]),
@@ -32,7 +35,7 @@ class Box(Collider):
 
     def __init__(
         self,
-        center: Vector = (0.0, 0.0, 0.0),
+        center: parameter.Vector = (0.0, 0.0, 0.0),
         size: Any = (1.0, 1.0, 1.0),
         *,
         inside: bool = False,
@@ -51,20 +54,26 @@ class Box(Collider):
     def surfaces(self) -> Sequence[Collider]:
         return self.walls or (self,)
 
-    def local_distance(self, x: Array) -> Array:
-        if self.walls:
-            nearest: Array = np.min(self.half - np.abs(x), axis=1)
-            return nearest
-        q: Array = np.abs(x) - self.half
-        inside: Array = np.minimum(q.max(axis=1), 0)
-        return lengths(np.maximum(q, 0)) + inside
+    @staticmethod
+    def distance_law(x: Triple, *shape: Number) -> Number:
+        *half, sign = shape
+        q, out = _beyond(x, half)
+        deepest = maximum(maximum(q[0], q[1]), q[2])
+        return sign * (length(out) + minimum(deepest, 0.0))
 
-    def local_normal(self, x: Array) -> Array:
-        q: Array = np.abs(x) - self.half
-        out = np.maximum(q, 0)
-        face = np.eye(3)[np.argmax(q, axis=1)]
-        n = -face if self.walls else directions(out, lengths(out), face)
-        return np.where(x < 0, -n, n)
+    @staticmethod
+    def normal_law(x: Triple, *shape: Number) -> Triple:
+        *half, sign = shape
+        q, out = _beyond(x, half)
+        first = (q[1] <= q[0]) & (q[2] <= q[0])
+        second = ~first & (q[2] <= q[1])
+        face = (where(first, 1.0, 0.0), where(second, 1.0, 0.0), where(first | second, 0.0, 1.0))
+        n = along(out, length(out), face)
+        return Vector(sign * where(p < 0.0, -a, a) for p, a in zip(x, n, strict=True))
+
+    @property
+    def shape(self) -> tuple[float, ...]:
+        return (*self.half.tolist(), -1.0 if self.walls else 1.0)
 
     def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:
         corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * self.half
@@ -80,3 +89,9 @@ class Box(Collider):
         )
         wall.motion, wall.offset = self.motion, -float(self.half[axis])
         return wall
+
+
+def _beyond(x: Triple, half: Sequence[Number]) -> tuple[Vector, Vector]:
+    """How far a point is beyond the faces along each axis, and the same with 0 for within."""
+    q = Vector(absolute(a) - h for a, h in zip(x, half, strict=True))
+    return q, Vector(maximum(a, 0.0) for a in q)

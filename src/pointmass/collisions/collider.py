@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pointmass.collisions.laws import Laws, laws_of
 from pointmass.collisions.motion import Motion
 from pointmass.description import Described
 from pointmass.errors import InvalidInput, finite_array, number
 from pointmass.laws.parameter import Vector
+from pointmass.tracing.functions import Number, Triple
 
 Array = NDArray[np.floating[Any]]
 Contact = Literal["swept", "discrete"]
@@ -21,8 +24,9 @@ Contact = Literal["swept", "discrete"]
 class Collider(Described, ABC):
     """A surface that particles bounce off: V' = V_T - k_r V_N (lecture, "Collision Response").
 
-    Coulomb friction acts on V_T. The free side is where the signed distance is positive. Distances are computed in
-    float64.
+    Coulomb friction acts on V_T. The free side is where the signed distance is positive. Its shape is two laws of
+    numbers, `distance_law` and `normal_law`, that are traced; both paths are printed from them, and distances are
+    computed in float64 in both.
 
     Attributes
     ----------
@@ -35,9 +39,11 @@ class Collider(Described, ABC):
     place : name of that point among the arguments.
     bulges : True where the solid is convex (ball, block): a line between two free points may pass through it. False
         where the free space is convex (plane, inside of a sphere).
+    curved : False where the surface is flat everywhere, and only there.
     """
 
     bulges: ClassVar[bool] = True
+    curved: ClassVar[bool] = True
     place: ClassVar[str] = "center"
 
     def __init__(self, place: Vector, restitution: float, friction: float, eps: float, contact: Contact) -> None:
@@ -59,20 +65,43 @@ class Collider(Described, ABC):
         """Whether the place depends on t."""
         return self.motion.fixed is None
 
+    @staticmethod
     @abstractmethod
+    def distance_law(x: Triple, *shape: Number) -> Number:
+        """Signed distance [m] of a point relative to the place; `shape` are the numbers of `shape`."""
+
+    @staticmethod
+    @abstractmethod
+    def normal_law(x: Triple, *shape: Number) -> Triple:
+        """Gradient of the distance, a unit vector."""
+
+    @property
+    @abstractmethod
+    def shape(self) -> tuple[float, ...]:
+        """Numbers that the laws of the shape take."""
+
+    @property
+    def laws(self) -> Laws:
+        """The laws of the shape as programs."""
+        return _traced(type(self), len(self.shape))
+
     def local_distance(self, x: Array) -> Array:
         """Signed distance [m] of points given relative to the place, shape (k,)."""
+        (result,) = self.laws.distance.columns(*_components(x), *self.shape)
+        return np.broadcast_to(result, len(x))
 
-    @abstractmethod
     def local_normal(self, x: Array) -> Array:
         """Gradient of the distance, unit vectors, shape (k, 3)."""
+        parts = self.laws.normal.columns(*_components(x), *self.shape)
+        return np.stack([np.broadcast_to(p, len(x)) for p in parts], axis=1)
 
     def bending(self, x: Array, v: Array) -> Array:
         """How fast the surface curves away under a velocity [m/s^2], shape (k,); 0 for flat surfaces.
 
         It is v . H v with H the Hessian of the distance; `x` is relative to the place.
         """
-        return np.zeros(len(x))
+        (result,) = self.laws.bending.columns(*_components(x), *_components(v), *self.shape)
+        return np.broadcast_to(result, len(x))
 
     @property
     def surfaces(self) -> Sequence[Collider]:
@@ -102,6 +131,15 @@ class Collider(Described, ABC):
     def acceleration(self, t: Any) -> Array:
         """Acceleration of the surface [m/s^2], shape (3,) or (k, 3)."""
         return self.motion.acceleration(t)
+
+
+@cache
+def _traced(kind: type[Collider], count: int) -> Laws:
+    return laws_of(kind.__name__, kind.distance_law, kind.normal_law, count, kind.curved)
+
+
+def _components(x: Array) -> list[NDArray[np.float64]]:
+    return [x[:, k].astype(np.float64) for k in range(3)]
 
 
 def unit(name: str, value: Any) -> NDArray[np.float64]:

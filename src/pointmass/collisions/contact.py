@@ -18,8 +18,8 @@ from pointmass.collisions.collider import Array, Collider, directions, lengths, 
 
 Rows = NDArray[np.intp]
 Mask = NDArray[np.bool_]
-PASSES = 64  # over the contacts of particles that stand on more than one surface
-SETTLED = 1e-13  # relative change of the contact forces at which the passes end
+PASSES = 64  # over the contacts of a particle that stands on more than one surface
+SETTLED = 1e-13  # relative change of its contact forces at which the passes end
 STILL = 64.0  # roundings of a velocity: a slower one along a surface is none
 NONE = np.zeros(3)
 
@@ -77,7 +77,7 @@ class Contacts:
         self.order = order
         self.lagged = lagged
         self.standing: list[Standing] = []
-        self._passes = 1
+        self._several = np.zeros(0, bool)  # who stands on more than one surface
 
     def on(self, surface: Collider) -> Rows:
         """Rows of the particles that stand on a surface."""
@@ -103,26 +103,23 @@ class Contacts:
             if len(rows):
                 a = acceleration() if a is None else a
                 self._stand(surface, rows, gap[rows], x, v, m, a, t)
-        shared = sum(len(s.rows) for s in self.standing) > len({r for s in self.standing for r in s.rows.tolist()})
-        self._passes = PASSES if shared else 1
-        for _ in range(self._passes if self.order == 2 else 0):
-            moving = [self._stop(stand, v, t) for stand in self.standing]
-            if not any(moving):
-                break
+        rows = np.concatenate([s.rows for s in self.standing]) if self.standing else np.zeros(0, np.intp)
+        self._several = np.bincount(rows, minlength=len(x)) > 1
+        if self.order == 2:
+            self._relax(np.ones(len(x), bool), lambda stand, go: self._stop(stand, v, t, go))
         for stand in self.standing:
             self._choose_slide(stand, v, m, a, t)
 
     def forces(self, t: Any, x: Array, v: Array, m: Array, f: Array) -> None:
         """Take away what presses into the surfaces, and add friction (projected Gauss-Seidel over the contacts)."""
-        looks = [self._look(stand, t, x, v, m) for stand in self.standing]
+        looks = {id(stand): self._look(stand, t, x, v, m) for stand in self.standing}
+
+        def bear(friction: bool) -> Callable[[Standing, Mask], Mask]:
+            return lambda stand, go: self._bear(stand, *looks[id(stand)], f, friction, go)
+
         # Loads before friction: in a corner, friction would else be spent on what another surface bears.
-        for friction in (False, True) if self._passes > 1 else (True,):
-            for _ in range(self._passes):
-                changed = [
-                    self._bear(stand, *look, f, friction) for stand, look in zip(self.standing, looks, strict=True)
-                ]
-                if not any(changed):
-                    break
+        self._relax(self._several, bear(friction=False))
+        self._relax(np.ones(len(x), bool), bear(friction=True))
 
     def projection(self, n: int) -> Any:
         """Directions in which contacts leave particles free, shape (3n, 3n): what the lagged filter does to df.
@@ -135,9 +132,11 @@ class Contacts:
         for stand in self.standing:
             across = np.eye(3) - stand.normal[:, :, None] * stand.normal[:, None, :]
             hold = stand.sticks & (stand.surface.friction > 0)
-            blocks[stand.rows] = np.where(hold[:, None, None], 0, across @ blocks[stand.rows])
-        if self._passes > 1:
-            blocks = np.linalg.matrix_power(blocks, self._passes)
+            blocks[stand.rows] = np.where(hold[:, None, None], 0, _products(across, blocks[stand.rows]))
+        shared = blocks[self._several]
+        for _ in range(PASSES.bit_length() - 1):  # to the power of PASSES
+            shared = _products(shared, shared)
+        blocks[self._several] = shared
         return bsr_array((blocks, np.arange(n), np.arange(n + 1)), shape=(3 * n, 3 * n)).tocsr()
 
     def settle(self, x: Array, v: Array, t: Array, h: Array, radius: Array) -> None:
@@ -152,10 +151,27 @@ class Contacts:
         """
         for stand in self.standing:
             self._hold(stand, x, v, t, h)
-        for _ in range(self._passes):
-            moved = [self._put_back(stand, x, v, t, h, radius) for stand in self.standing]
-            if not any(moved):
-                break
+        self._relax(np.ones(len(x), bool), lambda stand, go: self._put_back(stand, x, v, t, h, radius, go))
+
+    def _relax(self, active: Mask, once: Callable[[Standing, Mask], Mask]) -> None:
+        """Go over the contacts of each particle, surface by surface, until its own have settled.
+
+        Who stands on one surface is done at once: its bits do not depend on others.
+
+        Parameters
+        ----------
+        active : which particles, shape (n,).
+        once : changes one contact of those rows of a `Standing` that a mask marks; returns where that did something.
+        """
+        for _ in range(PASSES):
+            changed = np.zeros(len(active), bool)
+            for stand in self.standing:
+                go = active[stand.rows]
+                if go.any():
+                    changed[stand.rows] |= go & once(stand, go)
+            active = changed & self._several
+            if not active.any():
+                return
 
     # ------------------------------------------------------------------------------------------------ at the start
 
@@ -182,12 +198,14 @@ class Contacts:
             self.standing.append(Standing(surface, rows, local[stands], level, nothing, nothing[:, 0], load))
             self.standing[-1].normal = normal[stands]
 
-    def _stop(self, stand: Standing, v: Array, t: Array) -> bool:
-        """Take the velocity into and out of the surface; whether there was any."""
+    def _stop(self, stand: Standing, v: Array, t: Array, go: Mask) -> Mask:
+        """Take the velocity into and out of the surface; where there was any."""
         _, motion = stand.motion(t)
         speed = rows_dot(v[stand.rows] - motion, stand.normal)
-        v[stand.rows] -= speed[:, None] * stand.normal
-        return bool((np.abs(speed) > _roundoff(v[stand.rows], motion)).any())
+        after = v[stand.rows] - speed[:, None] * stand.normal
+        v[stand.rows] = np.where(go[:, None], after, v[stand.rows])
+        moving: Mask = np.abs(speed) > _roundoff(v[stand.rows], motion)
+        return moving
 
     def _choose_slide(self, stand: Standing, v: Array, m: Array, a: Array | None, t: Array) -> None:
         """Who slides along the surface, and in which direction friction will work."""
@@ -226,8 +244,8 @@ class Contacts:
         bend = surface.bending(local, v[rows] - surface.velocity(now))
         return mass[:, None] * surface.acceleration(now), mass * bend
 
-    def _bear(self, stand: Standing, carried: Array, bend: Array, f: Array, friction: bool) -> bool:
-        """Give each contact the force that it bears now; whether that is another than before."""
+    def _bear(self, stand: Standing, carried: Array, bend: Array, f: Array, friction: bool, go: Mask) -> Mask:
+        """Give each contact the force that it bears now; where that is another than before."""
         rows, normal = stand.rows, stand.normal
         free = f[rows] - stand.given - carried
         into = rows_dot(free, normal)
@@ -235,28 +253,31 @@ class Contacts:
         if self.lagged:
             stand.pressed = np.ones(len(rows), bool)
         else:
-            stand.pressed = load > 0
+            stand.pressed = np.where(go, load > 0, stand.pressed)
             load = np.maximum(load, 0)
         given = load[:, None] * normal
         if friction and self.order == 2 and stand.surface.friction > 0:
-            given = given + self._friction(stand, free - into[:, None] * normal, load)
+            force, held = self._friction(stand, free - into[:, None] * normal, load)
+            given = given + force
+            stand.held = np.where(go, held, stand.held)
         change = given - stand.given
-        f[rows] += change
-        stand.given = given
-        return self._passes > 1 and bool((lengths(change) > SETTLED * lengths(given)).any())
+        f[rows] = np.where(go[:, None], f[rows] + change, f[rows])
+        stand.given = np.where(go[:, None], given, stand.given)
+        changed: Mask = lengths(change) > SETTLED * lengths(given)
+        return changed
 
-    def _friction(self, stand: Standing, along: Array, load: Array) -> Array:
-        """Friction against the force `along` a surface, or against the slide."""
+    def _friction(self, stand: Standing, along: Array, load: Array) -> tuple[Array, Mask]:
+        """Friction against the force `along` a surface, or against the slide, and whom it holds."""
         if self.lagged:
             most = stand.surface.friction * stand.load
-            stand.held = stand.sticks
+            held = stand.sticks
             hold = along
         else:
             most = stand.surface.friction * load
             size = lengths(along)
-            stand.held = stand.sticks & (size <= most)
+            held = stand.sticks & (size <= most)
             hold = np.minimum(most / np.where(size > 0, size, 1), 1)[:, None] * along
-        return -np.where(stand.sticks[:, None], hold, most[:, None] * stand.slide)
+        return -np.where(stand.sticks[:, None], hold, most[:, None] * stand.slide), held
 
     # ------------------------------------------------------------------------------------------------ at the end
 
@@ -272,26 +293,33 @@ class Contacts:
         v[rows] = np.where(held[:, None], motion, v[rows])
         now = rows_dot(v[rows] - motion, stand.slide)
         stopped = went & (now < 0) & (stand.speed > 0)
-        way = 0.5 * h[rows] * stand.speed**2 / np.where(stopped, stand.speed - now, 1)  # until it stopped
+        way = 0.5 * h[rows] * stand.speed * stand.speed / np.where(stopped, stand.speed - now, 1)  # until it stopped
         beyond = rows_dot(x[rows] - place - stand.start, stand.slide) - way
-        x[rows] -= np.where(stopped, beyond, 0)[:, None] * stand.slide
-        v[rows] -= np.where(stopped, now, 0)[:, None] * stand.slide
+        x[rows] = np.where(stopped[:, None], x[rows] - beyond[:, None] * stand.slide, x[rows])
+        v[rows] = np.where(stopped[:, None], v[rows] - now[:, None] * stand.slide, v[rows])
 
-    def _put_back(self, stand: Standing, x: Array, v: Array, t: Array, h: Array, radius: Array) -> bool:
-        """Put those that are pressed on back on the surface, and those that sank out of it; whether there were any."""
+    def _put_back(self, stand: Standing, x: Array, v: Array, t: Array, h: Array, radius: Array, go: Mask) -> Mask:
+        """Put those that are pressed on back on the surface, and those that sank out of it; where there were any."""
         rows, surface = stand.rows, stand.surface
         place, motion = stand.motion(t)
         local = x[rows] - place
         normal = surface.local_normal(local)
         gap = surface.local_distance(local) - radius[rows] - stand.level
-        went = h[rows] > 0
-        on = went & (stand.pressed | (gap < 0))
+        on = go & (h[rows] > 0) & (stand.pressed | (gap < 0))
         off = np.where(on & ((gap < 0) | (gap > surface.eps)), gap, 0)
-        x[rows] -= off[:, None] * normal
+        x[rows] = np.where(on[:, None], x[rows] - off[:, None] * normal, x[rows])
         if self.order == 2:
             speed = rows_dot(v[rows] - motion, normal)
-            v[rows] -= np.where(on & (stand.pressed | (speed < 0)), speed, 0)[:, None] * normal
-        return bool((np.abs(off) > _roundoff(x[rows], place)).any())
+            across = on & (stand.pressed | (speed < 0))
+            v[rows] = np.where(across[:, None], v[rows] - speed[:, None] * normal, v[rows])
+        moved: Mask = np.abs(off) > _roundoff(x[rows], place)
+        return moved
+
+
+def _products(a: Array, b: Array) -> Array:
+    """Products of 3 x 3 matrices, shape (k, 3, 3), each added up in order: matmul's order depends on the machine."""
+    result: Array = a[:, :, 0:1] * b[:, 0:1] + a[:, :, 1:2] * b[:, 1:2] + a[:, :, 2:3] * b[:, 2:3]
+    return result
 
 
 def _roundoff(v: Array, motion: Array) -> Array:

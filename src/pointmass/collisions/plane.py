@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, Contact, rows_dot, unit
+from pointmass.collisions.collider import Array, Collider, Contact, unit
 from pointmass.laws.parameter import Vector
+from pointmass.tracing.functions import Number, Triple, dot
 
 
 class Plane(Collider):
@@ -22,6 +23,7 @@ class Plane(Collider):
     """
 
     bulges: ClassVar[bool] = False
+    curved: ClassVar[bool] = False
     place: ClassVar[str] = "point"
 
     def __init__(
@@ -38,11 +40,18 @@ class Plane(Collider):
         self.direction = unit("normal", normal)
         self.offset = 0.0
 
-    def local_distance(self, x: Array) -> Array:
-        return rows_dot(x, self.direction) - self.offset
+    @staticmethod
+    def distance_law(x: Triple, *shape: Number) -> Number:
+        *normal, offset = shape
+        return dot(x, normal) - offset
 
-    def local_normal(self, x: Array) -> Array:
-        return np.broadcast_to(self.direction, x.shape)
+    @staticmethod
+    def normal_law(x: Triple, *shape: Number) -> Triple:
+        return shape[:3]
+
+    @property
+    def shape(self) -> tuple[float, ...]:
+        return (*self.direction.tolist(), self.offset)
 
     def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:
         helper = np.eye(3)[int(np.argmin(np.abs(self.direction)))]

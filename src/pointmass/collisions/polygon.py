@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, Contact, directions, lengths, rows_dot
+from pointmass.collisions.collider import Array, Collider, Contact
+from pointmass.collisions.laws import along
 from pointmass.errors import InvalidInput, finite_array, number
-from pointmass.laws.parameter import Vector
+from pointmass.laws import parameter
+from pointmass.tracing.functions import Number, Triple, dot, length, maximum, minimum, scale, sub, where
+from pointmass.tracing.program import Vector
 
 
 class Polygon(Collider):
@@ -30,7 +34,7 @@ class Polygon(Collider):
         vertices: Any,
         *,
         thickness: float = 2e-3,
-        shift: Vector = (0.0, 0.0, 0.0),
+        shift: parameter.Vector = (0.0, 0.0, 0.0),
         restitution: float = 0.5,
         friction: float = 0.3,
         eps: float = 1e-4,
@@ -41,12 +45,19 @@ class Polygon(Collider):
         self.half = 0.5 * number("thickness", thickness, above=0, unit="m")
         self.direction, self.outward = self._frame()
 
-    def local_distance(self, x: Array) -> Array:
-        return lengths(x - self._nearest(x)) - self.half
+    @staticmethod
+    def distance_law(x: Triple, *shape: Number) -> Number:
+        return length(_from_nearest(x, shape)) - shape[-1]
 
-    def local_normal(self, x: Array) -> Array:
-        d = x - self._nearest(x)
-        return directions(d, lengths(d), self.direction)
+    @staticmethod
+    def normal_law(x: Triple, *shape: Number) -> Triple:
+        d = _from_nearest(x, shape)
+        return along(d, length(d), shape[-4:-1])
+
+    @property
+    def shape(self) -> tuple[float, ...]:
+        """The corners, the directions out of the edges, the normal, half the thickness."""
+        return (*self.vertices.ravel().tolist(), *self.outward.ravel().tolist(), *self.direction.tolist(), self.half)
 
     def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:
         k = len(self.vertices)
@@ -74,20 +85,20 @@ class Polygon(Collider):
             raise InvalidInput("vertices of a polygon must go around it in order and it must be convex: split it")
         return n, outward
 
-    def _depths(self, x: Array) -> Array:
-        """How far points are outside of each edge, shape (k, edges)."""
-        return np.stack([rows_dot(x - p, o) for p, o in zip(self.vertices, self.outward, strict=True)], axis=1)
 
-    def _nearest(self, x: Array) -> Array:
-        """Nearest points of the polygon, shape (k, 3)."""
-        n = self.direction
-        best = x - rows_dot(x - self.vertices[0], n)[:, None] * n
-        outside = (self._depths(x) > 0).any(axis=1)
-        distance = np.where(outside, np.inf, -1.0)
-        for a, b in zip(self.vertices, np.roll(self.vertices, -1, axis=0), strict=True):
-            along = np.clip(rows_dot(x - a, b - a) / rows_dot(b - a, b - a), 0, 1)[:, None]
-            point = a + along * (b - a)
-            d2 = rows_dot(x - point, x - point)
-            closer = d2 < distance
-            best, distance = np.where(closer[:, None], point, best), np.where(closer, d2, distance)
-        return best
+def _from_nearest(x: Triple, shape: Sequence[Number]) -> Vector:
+    """From the nearest point of the flat polygon to x."""
+    *triples, normal = (shape[k : k + 3] for k in range(0, len(shape) - 1, 3))
+    corners, outward = triples[: len(triples) // 2], triples[len(triples) // 2 :]
+    best = scale(dot(sub(x, corners[0]), normal), normal)
+    outside = dot(sub(x, corners[0]), outward[0]) > 0.0
+    for corner, out in zip(corners[1:], outward[1:], strict=True):
+        outside = outside | (dot(sub(x, corner), out) > 0.0)
+    nearest = where(outside, np.inf, -1.0)
+    for a, b in zip(corners, [*corners[1:], corners[0]], strict=True):
+        edge, way = sub(b, a), sub(x, a)
+        part = minimum(maximum(dot(way, edge) / dot(edge, edge), 0.0), 1.0)
+        d = sub(way, scale(part, edge))
+        closer = dot(d, d) < nearest
+        best, nearest = where(closer, d, best), where(closer, dot(d, d), nearest)
+    return best

@@ -7,11 +7,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, Contact, directions, lengths, rows_dot
+from pointmass.collisions.collider import Array, Collider, Contact
+from pointmass.collisions.laws import UP, along
 from pointmass.errors import number
 from pointmass.laws.parameter import Vector
-
-UP = np.array([0.0, 1.0, 0.0])  # at the very centre every direction is as good
+from pointmass.tracing.functions import Number, Triple, length
 
 
 class Sphere(Collider):
@@ -43,17 +43,18 @@ class Sphere(Collider):
         self.bulges = not inside  # type: ignore[misc]  # a property of this sphere
         self.sign = -1.0 if inside else 1.0
 
-    def local_distance(self, x: Array) -> Array:
-        return self.sign * (lengths(x) - self.radius)
+    @staticmethod
+    def distance_law(x: Triple, *shape: Number) -> Number:
+        radius, sign = shape
+        return sign * (length(x) - radius)
 
-    def local_normal(self, x: Array) -> Array:
-        return self.sign * directions(x, lengths(x), UP)
+    @staticmethod
+    def normal_law(x: Triple, *shape: Number) -> Triple:
+        return shape[1] * along(x, length(x))
 
-    def bending(self, x: Array, v: Array) -> Array:
-        r2 = rows_dot(x, x)
-        r2 = np.where(r2 > 0, r2, 1)
-        across = rows_dot(v, v) - rows_dot(x, v) ** 2 / r2
-        return self.sign * across / np.sqrt(r2)
+    @property
+    def shape(self) -> tuple[float, ...]:
+        return self.radius, self.sign
 
     def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:
         return sphere_mesh(self.radius)
@@ -73,4 +74,4 @@ def sphere_mesh(radius: float, rings: int = 32) -> tuple[Array, NDArray[np.int32
     top = np.stack([np.full(around, north), (k + 1) % around, k], axis=1)
     bottom = np.stack([np.full(around, south), last + k, last + (k + 1) % around], axis=1)
     faces = np.concatenate([top, quads[:, [0, 1, 2]], quads[:, [0, 2, 3]], bottom])
-    return radius * np.concatenate([corners, [UP, -UP]]), faces.astype(np.int32)
+    return radius * np.concatenate([corners, np.outer((1, -1), UP)]), faces.astype(np.int32)

@@ -198,7 +198,7 @@ class ReferenceEngine:
         def acceleration() -> Array:
             system.clear_forces()
             system.calculate_forces(t, x, v)
-            return p.f / p.m[:, None] if system.order == 2 else p.f.copy()
+            return p.f * p.w[:, None] if system.order == 2 else p.f.copy()
 
         contacts.find(x, v, p.m, acceleration, t, p.radius, (h[self._islands] > 0) & ~p.pinned)
         system.filter = contacts if contacts.standing else None
@@ -240,6 +240,7 @@ class ReferenceEngine:
         fix = y - step.y1
         _by_particle(fix, system.order)[:, ~np.isnan(clock[islands])] = 0
         self._keep(step, h, fix)
+        system.filter = None  # what stands next is found before the next piece
         return y, clock, reset
 
     # ------------------------------------------------------------------------------------------------ impacts
@@ -342,28 +343,34 @@ class ReferenceEngine:
         Who began the step inside may stay as deep. Where surfaces leave no room at all, as in a closing press,
         somebody stays inside.
         """
-        radius = self.system.particles.radius
+        radius, rows = self.system.particles.radius, np.flatnonzero(moved)
         for _ in range(EVICTIONS):
-            clean = True
+            clean = np.ones(len(rows), bool)
             for surface in self._walls:
-                gap = surface.distance(x, t) - radius
-                rows = np.flatnonzero(moved & (gap < 0))
-                if not len(rows):
-                    continue
-                sunk = np.minimum(gap[rows] - self._depth(surface, rows), 0)
-                normal = surface.normal(x[rows], t[rows])
-                x[rows] -= sunk[:, None] * normal
-                away = respond(v[rows], normal, surface.velocity(t[rows]), 0.0, 0.0)
-                v[rows] = np.where((sunk < 0)[:, None], away, v[rows])
-                clean = clean and not (sunk < -_roundoff(x[rows])).any()
-            if clean:
+                clean &= self._evict_from(surface, rows, x, v, t, radius)
+            rows = rows[~clean]
+            if not len(rows):
                 return
-        self._send_back(x, v, t, moved)
+        self._send_back(x, v, t, rows)
 
-    def _send_back(self, x: Array, v: Array, t: Array, moved: Mask) -> None:
+    def _evict_from(self, surface: Collider, rows: Rows, x: Array, v: Array, t: Array, radius: Array) -> Mask:
+        """Put particles out of one surface, in place; who was outside of it, but for round-off."""
+        gap = surface.distance(x[rows], t[rows]) - radius[rows]
+        inside, clean = gap < 0, np.ones(len(rows), bool)
+        rows, gap = rows[inside], gap[inside]
+        if len(rows):
+            sunk = np.minimum(gap - self._depth(surface, rows), 0)
+            normal = surface.normal(x[rows], t[rows])
+            away = respond(v[rows], normal, surface.velocity(t[rows]), 0.0, 0.0)
+            out = (sunk < 0)[:, None]
+            x[rows] = np.where(out, x[rows] - sunk[:, None] * normal, x[rows])
+            v[rows] = np.where(out, away, v[rows])
+            clean[inside] = ~(sunk < -_roundoff(x[rows]))
+        return clean
+
+    def _send_back(self, x: Array, v: Array, t: Array, rows: Rows) -> None:
         """Whom surfaces push to and fro in a narrow corner rests where it was when the step began."""
         for surface in self._walls:
-            rows = np.flatnonzero(moved)
             gap = surface.distance(x[rows], t[rows]) - self.system.particles.radius[rows]
             stuck = gap < self._depth(surface, rows) - _roundoff(x[rows])
             x[rows[stuck]] = self._began[0][rows[stuck]]
