@@ -40,7 +40,9 @@ def over_pairs(law, state, numbers):
     for i in range(len(state.x)):
         for j in range(len(state.x)):
             if i != j:
-                part = law(state.x[i], state.m[i], numbers(i), state.x[j], state.m[j], numbers(j))
+                part = law(
+                    state.x[i], state.v[i], state.m[i], numbers(i), state.x[j], state.v[j], state.m[j], numbers(j)
+                )
                 result[i] = [a + b for a, b in zip(result[i], part, strict=True)]
     return result
 
@@ -159,7 +161,7 @@ def angle_energy(x, k_s, k_d, rest):
 # ------------------------------------------------------------------------------------------------ pairs
 
 
-def gravitation(xi, mi, pi, xj, mj, pj):
+def gravitation(xi, vi, mi, pi, xj, vj, mj, pj):
     d = sub(xi, xj)
     return scale(-pi["G"] * mi * mj / (dot(d, d) + pi["eps"] ** 2) ** 1.5, d)
 
@@ -169,12 +171,53 @@ def gravitation_energy(xi, mi, pi, xj, mj, pj):
     return -pi["G"] * mi * mj / math.sqrt(dot(d, d) + pi["eps"] ** 2)
 
 
-def point_vortices(xi, mi, pi, xj, mj, pj):
+def point_vortices(xi, vi, mi, pi, xj, vj, mj, pj):
     dx, dy = xi[0] - xj[0], xi[1] - xj[1]
     r2 = dx**2 + dy**2 + pi["eps"] ** 2
     if r2 == 0:
         return [0.0, 0.0, 0.0]
     return [-pj["circulation"] * dy / (2 * math.pi * r2), pj["circulation"] * dx / (2 * math.pi * r2), 0.0]
+
+
+def nearest_difference(xi, xj, box):
+    """xi minus the image of xj that is nearest, in a periodic box or without one."""
+    d = sub(xi, xj)
+    return d if box is None else [min((d[a] + k * box[a] for k in range(-3, 4)), key=abs) for a in range(3)]
+
+
+def near_pairs(x, cutoff, box=None):
+    """All ordered pairs within a cut-off."""
+    rows = range(len(x))
+    return {(i, j) for i in rows for j in rows if i != j and norm(nearest_difference(x[i], x[j], box)) < cutoff}
+
+
+def lennard_jones(xi, vi, mi, pi, xj, vj, mj, pj):
+    d = nearest_difference(xi, xj, pi["box"])
+    r = norm(d)
+    if r >= pi["cutoff"]:
+        return [0.0, 0.0, 0.0]
+    a = pi["sigma"] / r
+    return scale(24 * pi["epsilon"] * (2 * a**12 - a**6) / r**2, d)
+
+
+def lennard_jones_energy(xi, mi, pi, xj, mj, pj):
+    r = norm(nearest_difference(xi, xj, pi["box"]))
+    a, edge = pi["sigma"] / r, pi["sigma"] / pi["cutoff"]
+    return 4 * pi["epsilon"] * ((a**12 - a**6) - (edge**12 - edge**6)) if r < pi["cutoff"] else 0.0
+
+
+def soft_sphere(xi, vi, mi, pi, xj, vj, mj, pj):
+    d = nearest_difference(xi, xj, pi["box"])
+    r = norm(d)
+    overlap = pi["radius"] + pj["radius"] - r
+    if overlap <= 0:
+        return [0.0, 0.0, 0.0]
+    return scale((pi["k_s"] * overlap - pi["k_d"] * dot(sub(vi, vj), d) / r) / r, d)
+
+
+def soft_sphere_energy(xi, mi, pi, xj, mj, pj):
+    overlap = pi["radius"] + pj["radius"] - norm(nearest_difference(xi, xj, pi["box"]))
+    return 0.5 * pi["k_s"] * max(overlap, 0.0) ** 2
 
 
 # ------------------------------------------------------------------------------------------------ a grid

@@ -97,6 +97,9 @@ from .forces import (
     Harmonic as Harmonic,
 )
 from .forces import (
+    LennardJones as LennardJones,
+)
+from .forces import (
     Magnetic as Magnetic,
 )
 from .forces import (
@@ -104,6 +107,9 @@ from .forces import (
 )
 from .forces import (
     QuadraticDrag as QuadraticDrag,
+)
+from .forces import (
+    SoftSphere as SoftSphere,
 )
 from .forces import (
     Springs as Springs,
@@ -152,6 +158,9 @@ from .laws.elements import (
 )
 from .laws.grid import (
     Grid as Grid,
+)
+from .laws.pairs import (
+    pair_force as pair_force,
 )
 from .laws.unary import (
     unary_force as unary_force,

@@ -12,9 +12,11 @@ from pointmass.forces.gravitation import Gravitation
 from pointmass.forces.gravity import Gravity
 from pointmass.forces.grid_files import load_grid
 from pointmass.forces.harmonic import Harmonic
+from pointmass.forces.lennard_jones import LennardJones
 from pointmass.forces.magnetic import Magnetic
 from pointmass.forces.point_vortices import PointVortices
 from pointmass.forces.quadratic_drag import QuadraticDrag
+from pointmass.forces.soft_sphere import SoftSphere
 from pointmass.forces.springs import Springs
 from pointmass.forces.vortex import Vortex
 from pointmass.forces.wind import Wind
@@ -29,6 +31,8 @@ FORCES: dict[str, type[Force]] = {
     "attractor": Attractor,
     "harmonic": Harmonic,
     "gravitation": Gravitation,
+    "lennard_jones": LennardJones,
+    "soft_sphere": SoftSphere,
     "vortex": Vortex,
     "point_vortices": PointVortices,
     "wind": Wind,
@@ -48,9 +52,11 @@ __all__ = [
     "Gravitation",
     "Gravity",
     "Harmonic",
+    "LennardJones",
     "Magnetic",
     "PointVortices",
     "QuadraticDrag",
+    "SoftSphere",
     "Springs",
     "Vortex",
     "Wind",

@@ -27,11 +27,16 @@ class Gravitation(PairForce):
         )
 
     @staticmethod
-    def law(x1: Any, v1: Any, m1: Any, x2: Any, v2: Any, m2: Any, t: Any, G: Any, eps: Any) -> Any:
-        """Force of particle 2 on particle 1 [N]."""
+    def law(x1: Any, v1: Any, m1: Any, x2: Any, v2: Any, m2: Any, t: Any, eps: Any) -> Any:
+        """What particle 2 adds to the field at particle 1, without -G."""
         d = fn.sub(x1, x2)
-        r2 = fn.dot(d, d) + eps * eps
-        return fn.scale(-G * (m1 * m2) / (r2 * fn.sqrt(r2)), d)
+        inverse = 1.0 / fn.sqrt(fn.dot(d, d) + eps * eps)
+        return fn.scale(m2 * (inverse * inverse * inverse), d)
+
+    @staticmethod
+    def finish(sums: Any, x: Any, v: Any, m: Any, t: Any, G: Any) -> Any:
+        """Force on a particle in the field of all others [N]."""
+        return fn.scale(-G * m, sums)
 
     @staticmethod
     def potential(x1: Any, v1: Any, m1: Any, x2: Any, v2: Any, m2: Any, t: Any, G: Any, eps: Any) -> Any:
