@@ -124,21 +124,19 @@ class Contacts:
                 if not any(changed):
                     break
 
-    def projection(self, n: int) -> Any:
-        """Directions in which contacts leave particles free, shape (3n, 3n): what the lagged filter does to df.
+    def projection(self, n: int) -> Array:
+        """Directions in which contacts leave particles free, shape (n, 3, 3): what the lagged filter does to df.
 
         None where it sticks, along the surface where it slides.
         """
-        from scipy.sparse import bsr_array
-
-        blocks = np.tile(np.eye(3), (n, 1, 1))
+        blocks: Array = np.tile(np.eye(3), (n, 1, 1))
         for stand in self.standing:
             across = np.eye(3) - stand.normal[:, :, None] * stand.normal[:, None, :]
             hold = stand.sticks & (stand.surface.friction > 0)
             blocks[stand.rows] = np.where(hold[:, None, None], 0, across @ blocks[stand.rows])
         if self._passes > 1:
             blocks = np.linalg.matrix_power(blocks, self._passes)
-        return bsr_array((blocks, np.arange(n), np.arange(n + 1)), shape=(3 * n, 3 * n)).tocsr()
+        return blocks
 
     def settle(self, x: Array, v: Array, t: Array, h: Array, radius: Array) -> None:
         """Bring those that stood back to their surface at the end of a piece; in place.
