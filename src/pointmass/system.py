@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pointmass.collisions.collider import Collider
 from pointmass.errors import InvalidInput, about
 from pointmass.laws.elements import ConstraintForce
-from pointmass.laws.force import Blocks, Force
+from pointmass.laws.force import Blocks, Force, block_matrix
 from pointmass.particles import Array, Particles, Selection
 from pointmass.solvers.base import Solver
 from pointmass.solvers.registry import as_solver
@@ -25,8 +25,8 @@ class Filter(Protocol):
     def forces(self, t: Any, x: Array, v: Array, m: Array, f: Array) -> None:
         """Change the accumulators `f` in place."""
 
-    def projection(self, n: int) -> Any:
-        """Directions in which contacts leave particles free: a scipy.sparse array of shape (3n, 3n)."""
+    def projection(self, n: int) -> Array:
+        """Directions in which contacts leave each particle free, shape (n, 3, 3)."""
 
 
 @dataclass(frozen=True)
@@ -195,15 +195,16 @@ class ParticleSystem:
         for force in self.forces:
             if force.enabled:
                 force.add_jacobian(p, self._particle_time(t), x, v, blocks)
-        dx, dv = blocks.matrices(n)
-        free = np.repeat(np.where(p.pinned, 0.0, 1.0), 3)
+        rows, columns, dx, dv = blocks.entries(n)
         if self.order == 1:
-            return csr_array(diags_array(free) @ dx)
+            return block_matrix(rows, columns, dx * ~p.pinned[rows][:, None, None], n)
         if self.filter is not None:
             project = self.filter.projection(n)
-            dx, dv = project @ dx @ project, project @ dv @ project
-        weight = diags_array(np.repeat(p.w, 3))
-        return csr_array(block_array([[None, diags_array(free)], [weight @ dx, weight @ dv]]))
+            dx, dv = (_times(_times(project[rows], d), project[columns]) for d in (dx, dv))
+        weight = p.w[rows][:, None, None]
+        pull, damp = (block_matrix(rows, columns, weight * d, n) for d in (dx, dv))
+        moves = diags_array(np.repeat(np.where(p.pinned, 0.0, 1.0), 3))
+        return csr_array(block_array([[None, moves], [pull, damp]]))
 
     # ---------------------------------------------------------------------------------------- what users ask
 
@@ -310,3 +311,9 @@ class ParticleSystem:
 
 def _stack(parts: Sequence[NDArray[np.intp]]) -> NDArray[np.intp]:
     return np.concatenate(parts) if parts else np.zeros((0, 2), np.intp)
+
+
+def _times(a: Array, b: Array) -> Array:
+    """Products of 3x3 matrices, shape (k, 3, 3), added up from left to right as compiled kernels do."""
+    first, second, third = (a[:, :, k, None] * b[:, k, None, :] for k in range(3))
+    return first + second + third

@@ -27,7 +27,7 @@ def test_errors_that_are_no_numbers_shorten_the_step_the_most():
     control = PIController(1e-6, 1e-9, 5)
     with np.errstate(divide="ignore"):
         assert control.retreat(ERRORS)[-2:].tolist() == [0.2, 0.2]
-    assert control.factor(ERRORS, 0 * ERRORS + 1e-4)[0] == 10.0
+    assert control.factor(ERRORS, np.full(len(ERRORS), 1e-4))[0] == 10.0
 
 
 @pytest.mark.parametrize("name", ["scale", "factor", "retreat", "short", "first"])

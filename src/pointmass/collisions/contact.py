@@ -121,14 +121,12 @@ class Contacts:
         self._relax(self._several, bear(friction=False))
         self._relax(np.ones(len(x), bool), bear(friction=True))
 
-    def projection(self, n: int) -> Any:
-        """Directions in which contacts leave particles free, shape (3n, 3n): what the lagged filter does to df.
+    def projection(self, n: int) -> Array:
+        """Directions in which contacts leave particles free, shape (n, 3, 3): what the lagged filter does to df.
 
         None where it sticks, along the surface where it slides.
         """
-        from scipy.sparse import bsr_array
-
-        blocks = np.tile(np.eye(3), (n, 1, 1))
+        blocks: Array = np.tile(np.eye(3), (n, 1, 1))
         for stand in self.standing:
             across = np.eye(3) - stand.normal[:, :, None] * stand.normal[:, None, :]
             hold = stand.sticks & (stand.surface.friction > 0)
@@ -137,7 +135,7 @@ class Contacts:
         for _ in range(PASSES.bit_length() - 1):  # to the power of PASSES
             shared = _products(shared, shared)
         blocks[self._several] = shared
-        return bsr_array((blocks, np.arange(n), np.arange(n + 1)), shape=(3 * n, 3 * n)).tocsr()
+        return blocks
 
     def settle(self, x: Array, v: Array, t: Array, h: Array, radius: Array) -> None:
         """Bring those that stood back to their surface at the end of a piece; in place.

@@ -77,7 +77,7 @@ class ArrayForce(Force):
                 states = ((high, v), (low, v)) if which == 0 else ((x, high), (x, low))
                 up, down = (self._evaluate(particles, t, a, b, rows) for a, b in states)
                 result[which, :, :, axis] = (up - down) / (2 * h[rows, None])
-        blocks.add(rows, rows, result[0], result[1])
+        blocks.add_own(rows, result[0], result[1])
 
     def links(self, particles: Particles) -> Any:
         rows = particles.select(self.on)

@@ -24,12 +24,19 @@ Rows = NDArray[np.intp]
 
 @dataclass
 class Blocks:
-    """A sparse Jacobian under construction: 3x3 blocks at (row particle, column particle)."""
+    """A sparse Jacobian under construction: 3x3 blocks at (row particle, column particle).
+
+    Attributes
+    ----------
+    own : rows, df/dx and df/dv of forces that depend on the particle itself; they are added up in listed order, so
+        that a particle without partners has the same bits as in a compiled kernel.
+    """
 
     rows: list[Rows] = field(default_factory=list)
     columns: list[Rows] = field(default_factory=list)
     dx: list[Array] = field(default_factory=list)
     dv: list[Array] = field(default_factory=list)
+    own: list[tuple[Rows, Array, Array]] = field(default_factory=list)
 
     def add(self, rows: Rows, columns: Rows, dx: Array, dv: Array) -> None:
         """Add blocks df/dx and df/dv, each of shape (k, 3, 3)."""
@@ -38,18 +45,38 @@ class Blocks:
         self.dx.append(dx)
         self.dv.append(dv)
 
+    def add_own(self, rows: Rows, dx: Array, dv: Array) -> None:
+        """Add blocks on the diagonal; no particle is in `rows` twice."""
+        self.own.append((rows, dx, dv))
+
+    def entries(self, n: int) -> tuple[Rows, Rows, Array, Array]:
+        """Row, column, df/dx and df/dv of all blocks; those of a pair of particles may come in parts."""
+        own = np.zeros((2, n, 3, 3), np.result_type(np.float32, *(dx for _, dx, _ in self.own), *self.dx))
+        for rows, dx, dv in self.own:
+            own[0, rows] += dx
+            own[1, rows] += dv
+        diagonal = np.arange(n)
+        return (
+            np.concatenate([diagonal, *self.rows]),
+            np.concatenate([diagonal, *self.columns]),
+            np.concatenate([own[0], *self.dx]),
+            np.concatenate([own[1], *self.dv]),
+        )
+
     def matrices(self, n: int) -> tuple[Any, Any]:
         """df/dx and df/dv as scipy.sparse CSR arrays of shape (3n, 3n)."""
-        from scipy.sparse import csr_array
+        rows, columns, dx, dv = self.entries(n)
+        return block_matrix(rows, columns, dx, n), block_matrix(rows, columns, dv, n)
 
-        if not self.rows:
-            return csr_array((3 * n, 3 * n)), csr_array((3 * n, 3 * n))
-        axis = np.arange(3)
-        i = (3 * np.concatenate(self.rows)[:, None, None] + axis[:, None] + 0 * axis).ravel()
-        j = (3 * np.concatenate(self.columns)[:, None, None] + 0 * axis[:, None] + axis).ravel()
-        return tuple(  # type: ignore[return-value]
-            csr_array((np.concatenate(values).ravel(), (i, j)), shape=(3 * n, 3 * n)) for values in (self.dx, self.dv)
-        )
+
+def block_matrix(rows: Rows, columns: Rows, blocks: Array, n: int) -> Any:
+    """A scipy.sparse CSR array of shape (3n, 3n) from 3x3 blocks; those at the same place are added up."""
+    from scipy.sparse import csr_array
+
+    axis = np.arange(3)
+    i = (3 * rows[:, None, None] + axis[:, None] + 0 * axis).ravel()
+    j = (3 * columns[:, None, None] + 0 * axis[:, None] + axis).ravel()
+    return csr_array((blocks.ravel(), (i, j)), shape=(3 * n, 3 * n))
 
 
 class Force(Described, ABC):

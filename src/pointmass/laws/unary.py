@@ -60,7 +60,7 @@ class UnaryForce(Force):
         rows = particles.select(self.on)
         inputs = self._inputs(self._jacobian, particles, t, x, v, rows)
         values = matrix(self._jacobian.columns(*inputs), len(rows), x.dtype).reshape(-1, 3, 2, 3)
-        blocks.add(rows, rows, values[:, :, 0], values[:, :, 1])
+        blocks.add_own(rows, values[:, :, 0], values[:, :, 1])
 
     def energy(self, particles: Particles, t: float, x: Array, v: Array) -> float | None:
         if self.traced_potential is None:

@@ -29,13 +29,15 @@ class Stats:
     steps : steps of the solver, all islands at once, trials that were rejected included.
     rejected : trials that were rejected, counted for each island.
     evaluations : of deriv_eval, for all islands at once.
-    iterations : of Newton's method.
+    iterations : of Newton's method, counted for each island.
+    cg_iterations : of conjugate gradients, counted for each island.
     """
 
     steps: int = 0
     rejected: int = 0
     evaluations: int = 0
     iterations: int = 0
+    cg_iterations: int = 0
 
     def __add__(self, other: Stats) -> Stats:
         return Stats(
@@ -43,6 +45,7 @@ class Stats:
             self.rejected + other.rejected,
             self.evaluations + other.evaluations,
             self.iterations + other.iterations,
+            self.cg_iterations + other.cg_iterations,
         )
 
 
@@ -151,6 +154,7 @@ class _Run:
         trial = self.solver.step(self.system, t, self.y, length, self.memory)
         self.stats.steps += 1
         self.stats.iterations += trial.iterations
+        self.stats.cg_iterations += trial.cg_iterations
         return trial
 
     def _judge(self, trial: Step, h: Array, wanted: Array) -> tuple[Mask, Memory]:

@@ -65,7 +65,8 @@ class Step:
     y0, y1 : state before and after, shape (dim,).
     memory : what the solver wants back at its next step; entries of shape (dim,) or (islands,).
     error : estimate of the local error, shape (dim,), from methods that have one.
-    iterations : Newton passes taken, 0 for explicit methods.
+    iterations : linear systems that Newton's method solved, counted for each island; 0 for explicit methods.
+    cg_iterations : of conjugate gradients, counted for each island.
     dense : theta in [0, 1] (a number or an array of shape (dim,)) -> state at t + theta h.
     """
 
@@ -77,6 +78,7 @@ class Step:
     memory: Memory = field(default_factory=dict)
     error: Array | None = None
     iterations: int = 0
+    cg_iterations: int = 0
 
 
 class Solver(Described, ABC):

@@ -19,7 +19,9 @@ class Implicit(Solver):
 
     Parameters
     ----------
-    linear_solver : "direct" for LU factors, "cg" for conjugate gradients (order 2; order 1 is solved directly).
+    linear_solver : "cg" for conjugate gradients, "direct" for LU factors, "auto" for what is faster: compiled steps
+        take conjugate gradients, the reference path LU factors, and both agree to the tolerances. Single particles and
+        systems of order 1 are always solved directly.
     newton : "full" until the equation is solved, "one" for a single linearised step (Baraff and Witkin 1998).
     tolerance : residual of the equation, relative to the size of its terms.
     max_iterations : linear systems for one step.
@@ -38,33 +40,36 @@ class Implicit(Solver):
 
     def __init__(
         self,
-        linear_solver: Literal["direct", "cg"] = "direct",
+        linear_solver: Literal["auto", "direct", "cg"] = "auto",
         newton: Literal["full", "one"] = "full",
         tolerance: float = 1e-10,
         max_iterations: int = 50,
         cg_tolerance: float = 1e-10,
     ) -> None:
-        if linear_solver not in ("direct", "cg"):
-            raise unknown("linear_solver", linear_solver, ("direct", "cg"))
+        if linear_solver not in ("auto", "direct", "cg"):
+            raise unknown("linear_solver", linear_solver, ("auto", "direct", "cg"))
         if newton not in ("full", "one"):
             raise unknown("newton", newton, ("full", "one"))
         self.linear_solver, self.newton = linear_solver, newton
         self.tolerance = number("tolerance", tolerance, above=0.0)
         self.max_iterations = whole_number("max_iterations", max_iterations, at_least=1)
         self.cg_tolerance = number("cg_tolerance", cg_tolerance, above=0.0)
-        linear = ConjugateGradients(self.cg_tolerance) if linear_solver == "cg" else direct
-        self._newton = Newton(linear, self.tolerance, self.max_iterations, newton == "one")
+        # "one" step shows what it leaves out of the matrix: both paths leave out the same
+        symmetric = linear_solver == "cg" or (linear_solver == "auto" and newton == "one")
+        self._gradients = ConjugateGradients(self.cg_tolerance) if symmetric else None
 
     def step(self, system: System, t: Clock, y: Array, h: Clock, memory: Memory) -> Step:
         """The state at t + h."""
         memory = memory or self.start(system)
         length = np.broadcast_to(np.asarray(h, y.dtype), y.shape)
         z, gamma = self._stage(y, length, memory)
-        stage, iterations = self._newton.solve(system, t + self.c * h, z, gamma, y)
+        linear = direct if self._gradients is None or system.order == 1 else self._gradients
+        newton = Newton(linear, self.tolerance, self.max_iterations, self.newton == "one")
+        stage, iterations, inner = newton.solve(system, t + self.c * h, z, gamma, y)
         rise = stage - y
         y1 = moved(h, y, stage if self.c == 1.0 else moved(rise, y, y + rise / self.c))
         dense = straight(h, y, y1, system.order == 2)
-        return Step(t, h, y, y1, dense, self._remember(y, length, memory), iterations=iterations)
+        return Step(t, h, y, y1, dense, self._remember(y, length, memory), iterations=iterations, cg_iterations=inner)
 
     def _stage(self, y: Array, h: Array, memory: Memory) -> tuple[Array, Array]:
         """z and gamma, shape (dim,)."""

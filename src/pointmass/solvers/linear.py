@@ -1,7 +1,13 @@
-"""The linear systems of Newton's method: (1 - gamma J) delta = right."""
+"""The linear systems of Newton's method: (1 - gamma J) delta = load, for each island on its own.
+
+An order 2 system, J = [[0, P], [A, B]], is solved for the change of the velocities: (1 - gamma B - gamma^2 A P) dv
+= load (Baraff and Witkin, SIGGRAPH 1998, eq. 6). P is 0 for pinned entries, else 1. An island of three unknowns, one
+particle, is solved by a text of its own, which compiled kernels print as well.
+"""
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, ClassVar, Protocol, final
 
 import numpy as np
@@ -9,70 +15,150 @@ from numpy.typing import NDArray
 
 from pointmass.errors import Diverged
 from pointmass.solvers.base import Array, System
-from pointmass.solvers.islands import Islands, number_of, total
+from pointmass.solvers.islands import Islands, Mask, number_of, total
+from pointmass.tracing import functions as fn
+from pointmass.tracing.functions import Number, Triple
+from pointmass.tracing.trace import Traced, trace
 
 SMALL = 64  # up to this many unknowns a dense matrix is faster
 BLOCK = 3  # unknowns of one particle in space; any size is correct
+DEFINITE = 1e-12  # a pivot that is a smaller part of its diagonal entry counts as none
+VECTORS = [f"{m}{i}" for m in "ab" for i in range(BLOCK)]
 
 
 class LinearSolver(Protocol):
-    """Solves (1 - gamma J) delta = right."""
+    """Solves matrix delta = load."""
 
-    def __call__(self, jacobian: Any, gamma: Array, right: Array, system: System) -> Array:
-        """delta, shape (dim,).
+    def __call__(self, matrix: Any, load: Array, inertia: Array, islands: Islands) -> tuple[Array, int]:
+        """delta, shape (m,), and the number of iterations that it took, counted for each island.
 
         Parameters
         ----------
-        jacobian : of deriv_eval, scipy.sparse, shape (dim, dim).
-        gamma : of each entry of y [s], shape (dim,).
-        right : shape (dim,).
-        system : that the Jacobian belongs to.
+        matrix : scipy.sparse, shape (m, m).
+        load : shape (m,).
+        inertia : mass of each unknown, 0 for one that is pinned, shape (m,): M times the matrix is nearly symmetric.
+        islands : of each unknown, shape (m,).
         """
 
 
-def direct(jacobian: Any, gamma: Array, right: Array, system: System) -> Array:
-    """By LU factors, dense for small systems and sparse for large ones."""
-    from scipy import sparse
+def solve(
+    linear: LinearSolver, blocks: tuple[Any, Any], gamma: Array, load: Array, free: Mask, system: System
+) -> tuple[Array, int]:
+    """delta of all unknowns, shape (m,), and the number of iterations of the linear solver; 0 where the load is 0.
 
-    if len(right) <= SMALL:
-        return _factored(np.eye(len(right)) - gamma[:, None] * jacobian.toarray(), right)
-    if system.order == 1:
-        return _factored(sparse.eye_array(len(right)) - sparse.diags_array(gamma) @ jacobian, right)
-    matrix, load = velocity_block(jacobian, gamma, right)
-    return with_positions(jacobian, gamma, right, _factored(matrix, load))
-
-
-def velocity_block(jacobian: Any, gamma: Array, right: Array) -> tuple[Any, Array]:
-    """What is left for dv of an order 2 system, J = [[0, P], [A, B]]: matrix (n, n) and right side (n,).
-
-    (1 - gamma B - gamma A gamma P) dv = rv + gamma A rx, then dx = rx + gamma P dv (Baraff and Witkin, SIGGRAPH 1998,
-    eq. 6). P is 0 for pinned entries, else 1.
+    Parameters
+    ----------
+    blocks : A and B of the Jacobian, scipy.sparse of shape (m, m); for order 1 A is None, and B is J.
+    gamma : of each unknown [s], shape (m,).
+    load : shape (m,), 0 on islands that are solved.
+    free : unknowns that are not pinned.
     """
+    islands = system.islands[-len(load) :]
+    n = number_of(islands)
+    alone = np.bincount(islands, minlength=n) == BLOCK
+    busy = np.zeros(n, np.bool_)
+    busy[islands[load != 0.0]] = True
+    delta, count = np.zeros_like(load), 0
+    if (busy & alone).any():
+        rows = rows_of(busy & alone, islands)
+        delta[rows] = _alone(blocks, gamma[rows[:, 0]], load[rows], rows)
+    rest = np.flatnonzero((busy & ~alone)[islands])
+    if len(rest):
+        inertia = np.where(free, system.inertia if system.order == 2 else 1.0, 0.0)[rest]
+        matrix = _matrix(blocks, gamma, free)[rest][:, rest]
+        delta[rest], count = linear(matrix, load[rest], inertia, islands[rest])
+    return np.where(free, delta, 0.0), count
+
+
+def rows_of(mask: Mask, islands: Islands) -> NDArray[np.intp]:
+    """The three unknowns of each island of a mask, shape (k, 3)."""
+    rows = np.flatnonzero(mask[islands])
+    return rows[np.argsort(islands[rows], kind="stable")].reshape(-1, BLOCK)
+
+
+def diagonal(matrix: Any, rows: NDArray[np.intp]) -> Array:
+    """The blocks of a sparse matrix on the diagonal, shape (k, 3, 3)."""
+    i, j = np.repeat(rows, BLOCK, axis=1), np.tile(rows, BLOCK)
+    result: Array = matrix[i, j].toarray().reshape(-1, BLOCK, BLOCK)
+    return result
+
+
+def three(
+    a0: Triple, a1: Triple, a2: Triple, b0: Triple, b1: Triple, b2: Triple, g: Number, load: Triple
+) -> tuple[Number, ...]:
+    """delta of one particle, (1 - g B - g^2 A) delta = load, by Cramer's rule; the matrices are given by their rows."""
+    rows = []
+    for i, (a, b) in enumerate(((a0, b0), (a1, b1), (a2, b2))):
+        rows.append(tuple((1.0 if i == j else 0.0) - g * b[j] - (g * g) * a[j] for j in range(BLOCK)))
+    c = [fn.cross(rows[(i + 1) % BLOCK], rows[(i + 2) % BLOCK]) for i in range(BLOCK)]
+    determinant = fn.dot(rows[0], c[0])
+    return tuple((load[0] * c[0][j] + load[1] * c[1][j] + load[2] * c[2][j]) / determinant for j in range(BLOCK))
+
+
+def block_inverse(d00: Number, d01: Number, d02: Number, d11: Number, d12: Number, d22: Number) -> tuple[Number, ...]:
+    """The upper triangle of the inverse of a symmetric 3x3 matrix; where that is not positive definite, a diagonal."""
+    a, b, c = d11 * d22 - d12 * d12, d02 * d12 - d01 * d22, d01 * d12 - d02 * d11
+    minor, determinant = d00 * d11 - d01 * d01, d00 * a + d01 * b + d02 * c
+    flat = DEFINITE * fn.absolute(d00 * d11)
+    definite = (d00 > 0.0) & (minor > flat) & (determinant > flat * fn.absolute(d22))
+    inner = a, b, c, d00 * d22 - d02 * d02, d01 * d02 - d00 * d12, minor
+    sizes = [
+        fn.absolute(p) + fn.absolute(q) + fn.absolute(r)
+        for p, q, r in ((d00, d01, d02), (d01, d11, d12), (d02, d12, d22))
+    ]
+    outer = sizes[0], 0.0, 0.0, sizes[1], 0.0, sizes[2]
+    return tuple(fn.where(definite, i / determinant, fn.inverse(o)) for i, o in zip(inner, outer, strict=True))
+
+
+@cache
+def traced_three() -> Traced:
+    """`three` as a program."""
+    return trace(three, {**dict.fromkeys(VECTORS, "vector"), "g": "scalar", "load": "vector"}, BLOCK)
+
+
+@cache
+def traced_block_inverse() -> Traced:
+    """`block_inverse` as a program."""
+    return trace(block_inverse, dict.fromkeys(("d00", "d01", "d02", "d11", "d12", "d22"), "scalar"), 6)
+
+
+def _alone(blocks: tuple[Any, Any], gamma: Array, load: Array, rows: NDArray[np.intp]) -> Array:
+    """delta of islands of one particle, shape (k, 3)."""
+    a, b = (np.zeros((len(rows), BLOCK, BLOCK), load.dtype) if m is None else diagonal(m, rows) for m in blocks)
+    columns = [m[:, i, j] for m in (a, b) for i in range(BLOCK) for j in range(BLOCK)]
+    delta: Array = np.stack(traced_three().columns(*columns, gamma, *load.T), axis=1)
+    if not np.isfinite(delta[np.isfinite(load).all(axis=1)]).all():
+        raise singular()
+    return delta
+
+
+def _matrix(blocks: tuple[Any, Any], gamma: Array, free: Mask) -> Any:
+    """1 - gamma B - gamma A gamma P, shape (m, m)."""
     from scipy import sparse
 
-    n = len(right) // 2
-    lift, push = sparse.diags_array(gamma[:n]), sparse.diags_array(gamma[n:])
-    moves, pull, damp = jacobian[:n, n:], jacobian[n:, :n], jacobian[n:, n:]
-    matrix = sparse.eye_array(n) - push @ damp - push @ pull @ lift @ moves
-    return matrix, right[n:] + gamma[n:] * (pull @ right[:n])
+    pull, damp = blocks
+    push, one = sparse.diags_array(gamma), sparse.eye_array(len(gamma))
+    matrix = one - push @ damp
+    if pull is not None:
+        matrix = matrix - push @ pull @ sparse.diags_array(gamma * free)
+    return sparse.csr_array(matrix)
 
 
-def with_positions(jacobian: Any, gamma: Array, right: Array, dv: Array) -> Array:
-    """[dx, dv] from dv."""
-    n = len(dv)
-    return np.concatenate([right[:n] + gamma[:n] * (jacobian[:n, n:] @ dv), dv])
-
-
-def _factored(matrix: Any, right: Array) -> Array:
+def direct(matrix: Any, load: Array, inertia: Array, islands: Islands) -> tuple[Array, int]:
+    """By LU factors, dense for small systems and sparse for large ones."""
     from scipy.sparse.linalg import splu
 
     try:
-        if isinstance(matrix, np.ndarray):
-            return np.linalg.solve(matrix, right)
-        result: Array = splu(matrix.tocsc()).solve(right)
+        if len(load) <= SMALL:
+            return np.linalg.solve(matrix.toarray(), load), 0
+        return splu(matrix.tocsc()).solve(load), 0
     except (np.linalg.LinAlgError, RuntimeError):
-        raise Diverged("the equations of an implicit step are singular: use a smaller dt") from None
-    return result
+        raise singular() from None
+
+
+def singular() -> Diverged:
+    """The error for a matrix that has no inverse."""
+    return Diverged("the equations of an implicit step are singular: use a smaller dt")
 
 
 @final
@@ -98,45 +184,37 @@ class ConjugateGradients:
     def __init__(self, tolerance: float) -> None:
         self.tolerance = tolerance
 
-    def __call__(self, jacobian: Any, gamma: Array, right: Array, system: System) -> Array:
-        """delta of the symmetric part, shape (dim,); order 1 has no symmetry to use and is solved directly."""
+    def __call__(self, matrix: Any, load: Array, inertia: Array, islands: Islands) -> tuple[Array, int]:
+        """delta of the symmetric part."""
         from scipy import sparse
 
-        if system.order == 1:
-            return direct(jacobian, gamma, right, system)
-        n = len(right) // 2
-        matrix, load = velocity_block(jacobian, gamma, right)
-        free = np.isfinite(system.inertia) & (system.inertia > 0.0) & (jacobian[:n, n:].diagonal() != 0.0)
-        mass, fixed = np.where(free, system.inertia, 0.0), np.where(free, 0.0, load)
-        stiff = sparse.diags_array(mass) @ matrix @ sparse.diags_array(free.astype(np.float64))
+        free = inertia > 0.0
+        stiff = sparse.diags_array(inertia) @ matrix @ sparse.diags_array(free.astype(np.float64))
         symmetric = sparse.csr_array(0.5 * (stiff + stiff.T))
-        dv = fixed + self._iterate(symmetric, mass * (load - matrix @ fixed), free, system.islands[n:])
-        return with_positions(jacobian, gamma, right, dv)
-
-    def _iterate(self, matrix: Any, load: Array, free: NDArray[np.bool_], islands: Islands) -> Array:
         n = number_of(islands)
-        precondition = block_inverse(matrix, free)
-        x, r = np.zeros_like(load), load
+        precondition = _preconditioner(symmetric, free)
+        x, r = np.zeros_like(load), inertia * load
         z = precondition @ r
         p, rho = z, total(r * z, islands, n)
-        goal = self.tolerance**2 * rho
+        goal, count = self.tolerance**2 * rho, 0
         for _ in range(self.restarts * int(np.bincount(islands).max())):
-            q = matrix @ p
+            q = symmetric @ p
             curvature = total(p * q, islands, n)
             going = (rho > goal) & (curvature != 0.0)
             if not going.any():
                 break
+            count += int(going.sum())
             alpha = np.divide(rho, curvature, out=np.zeros(n), where=going)[islands]
             x, r = x + alpha * p, r - alpha * q
             z = precondition @ r
             fresh = np.where(going, total(r * z, islands, n), rho)
             p = z + np.divide(fresh, rho, out=np.zeros(n), where=going)[islands] * p
             rho = np.where(going, fresh, 0.0)
-        return x
+        return x, count
 
 
-def block_inverse(matrix: Any, free: NDArray[np.bool_]) -> Any:
-    """The inverse of the diagonal blocks, made positive definite; 0 where nothing is free."""
+def _preconditioner(matrix: Any, free: Mask) -> Any:
+    """The inverses of the diagonal blocks of a symmetric matrix, scipy.sparse."""
     from scipy import sparse
 
     n = len(free)
@@ -144,14 +222,14 @@ def block_inverse(matrix: Any, free: NDArray[np.bool_]) -> Any:
     entries = matrix.tocoo()
     rows, columns = entries.coords
     near = rows // BLOCK == columns // BLOCK
-    blocks = np.zeros((count, BLOCK, BLOCK))
-    blocks[rows[near] // BLOCK, rows[near] % BLOCK, columns[near] % BLOCK] = entries.data[near]
+    d = np.zeros((count, BLOCK, BLOCK))
+    d[rows[near] // BLOCK, rows[near] % BLOCK, columns[near] % BLOCK] = entries.data[near]
     idle = np.append(~free, np.ones(count * BLOCK - n, np.bool_)).reshape(count, BLOCK)
-    blocks[:, range(BLOCK), range(BLOCK)] += idle
-    values, vectors = np.linalg.eigh(blocks)
-    size = np.abs(values)
-    size = np.maximum(size, 1e-12 * size.max(axis=1, keepdims=True))
-    inverse = (vectors / size[:, None, :]) @ vectors.transpose(0, 2, 1)
-    shape = (count * BLOCK, count * BLOCK)
+    d[:, range(BLOCK), range(BLOCK)] += idle
+    upper = np.triu_indices(BLOCK)
+    inverse = np.empty_like(d)
+    for i, j, column in zip(*upper, traced_block_inverse().columns(*d[:, *upper].T), strict=True):
+        inverse[:, i, j] = inverse[:, j, i] = column
     index = np.arange(count)
+    shape = (count * BLOCK, count * BLOCK)
     return sparse.bsr_array((inverse, index, np.arange(count + 1)), shape=shape).tocsr()[:n, :n]
