@@ -1,0 +1,1 @@
+"""Races against peers: `python -m benchmarks.race`."""
