@@ -259,9 +259,7 @@ class _Worker:
             self._process.join()
 
 
-def _serve(
-    pipe: Connection, kind: type[Contestant], make: Callable[[], Any], rows: NDArray[np.intp] | None
-) -> None:
+def _serve(pipe: Connection, kind: type[Contestant], make: Callable[[], Any], rows: NDArray[np.intp] | None) -> None:
     """Prepare a contestant, show what it makes of the first frame, then do as many as are asked for."""
     with Path(os.devnull).open("w", encoding="utf-8") as nowhere:
         os.dup2(nowhere.fileno(), 1)  # peers are talkative
@@ -292,7 +290,9 @@ def _serve(
     except Missing as error:
         pipe.send(("out", f"left out: {error}"))
     except Exception as error:  # whatever a peer raises, the race goes on
-        pipe.send(("out", f"failed: {type(error).__name__}: {str(error).strip().splitlines()[0] if str(error) else ''}"))
+        pipe.send(
+            ("out", f"failed: {type(error).__name__}: {str(error).strip().splitlines()[0] if str(error) else ''}")
+        )
 
 
 def _memory(what: str) -> float:

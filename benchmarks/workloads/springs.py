@@ -261,7 +261,9 @@ class TaichiLattice(TaichiScatter):
         w = ti.field(ti.f32, (side, side))
         x.from_numpy(p.x.astype(np.float32).reshape(side, side, 3))
         w.from_numpy(p.w.astype(np.float32).reshape(side, side))
-        steps = [(s * a, s * b, float(np.mean(r))) for (a, b), r in zip(p.offsets, p.rest, strict=True) for s in (1, -1)]
+        steps = [
+            (s * a, s * b, float(np.mean(r))) for (a, b), r in zip(p.offsets, p.rest, strict=True) for s in (1, -1)
+        ]
         h, k_s, k_d, g = p.dt, p.k_s, p.k_d, ti.Vector([0.0, p.g, 0.0])
 
         @ti.kernel
