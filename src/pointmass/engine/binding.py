@@ -243,7 +243,7 @@ class Binder:
 def kinds(forces: list[Force]) -> tuple[Any, ...]:
     """What of the forces is compiled: another value needs another kernel."""
     return tuple(
-        (id(f), f.on is None, *(id(c.value) if isinstance(c.value, Traced) else type(c.value) for c in _components(f)))
+        (f, f.on is None, *(c.value if isinstance(c.value, Traced) else type(c.value) for c in _components(f)))
         for f in forces
     )
 

@@ -78,6 +78,7 @@ class Engine:
     _looked: bool = False  # whether the last step can no longer be looked into
     _kernels: tuple[Any, dict[Any, Any]] = (None, {})
     _groups: tuple[Any, list[Group]] = (None, [])
+    _structure: Rows | None = None  # islands that the groups are made of
 
     def __post_init__(self) -> None:
         self.reference = ReferenceEngine(self.system, self.solver)
@@ -209,9 +210,9 @@ class Engine:
         system = self.system
         islands = system.island_of_particle
         newborn = None if births is None else births > start
-        key = (id(islands), system.particles.version, kinds(system.forces), newborn is None)
-        if self._groups[0] != key or newborn is not None:
-            self._groups = (key, self._made_groups(islands, newborn))
+        key = (system.particles.version, self._kinds(), newborn is None)
+        if self._structure is not islands or self._groups[0] != key or newborn is not None:
+            self._structure, self._groups = islands, (key, self._made_groups(islands, newborn))
         return self._groups[1]
 
     def _made_groups(self, islands: Rows, newborn: NDArray[np.bool_] | None) -> list[Group]:
@@ -234,14 +235,17 @@ class Engine:
 
     def _kernel(self, kind: Any, *how: bool) -> Any:
         """The kernel of a kind for the system as it is, printed once."""
-        system = self.system
-        key = (kinds(system.forces), bool(system.particles.pinned.any()), all(f.enabled for f in system.forces))
-        if self._kernels[0] != key:
-            self._kernels = (key, {})
+        if self._kernels[0] != self._kinds():
+            self._kernels = (self._kinds(), {})
         known = self._kernels[1]
         if (kind, *how) not in known:
-            known[kind, *how] = kind(system, self.solver, *how)
+            known[kind, *how] = kind(self.system, self.solver, *how)
         return known[kind, *how]
+
+    def _kinds(self) -> tuple[Any, ...]:
+        """All that is compiled, and not data."""
+        forces = self.system.forces
+        return kinds(forces), bool(self.system.particles.pinned.any()), all(f.enabled for f in forces)
 
 
 def compiled_by_default() -> bool:

@@ -1,0 +1,65 @@
+"""The number of threads changes no bit."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+from pointmass.engine.threads import spread
+
+PROGRAM = """
+import hashlib, sys
+import numpy as np
+import pointmass as pm
+
+def chains(n, length, rng):
+    first = np.arange(n) * length
+    ends = np.concatenate([np.stack([first + k, first + k + 1], axis=1) for k in range(length - 1)])
+    return pm.Springs(ends, 50.0, 0.1, rest=0.5)
+
+rng = np.random.default_rng(1)
+hash = hashlib.sha256()
+for n, dtype in ((5000, "float64"), (3000, "float32")):
+    for solver in (pm.SymplecticEuler(), pm.DormandPrince()):
+        particles = pm.Particles(rng.uniform(-1, 1, (n, 3)), rng.uniform(-1, 1, (n, 3)), dtype=dtype)
+        forces = [pm.Gravity(), pm.QuadraticDrag(0.1), chains(n // 10, 5, rng)]
+        sim = pm.Simulation(pm.ParticleSystem(particles, forces), solver, 1 / 60, compiled=True)
+        sim.step(10)
+        hash.update(particles.x.tobytes() + particles.v.tobytes() + particles.age.tobytes())
+print(hash.hexdigest())
+"""
+
+
+def digest(threads: int) -> str:
+    environment = {**os.environ, "NUMBA_NUM_THREADS": str(threads)}
+    done = subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=True)
+    return done.stdout
+
+
+def test_one_two_three_and_seven_threads_give_the_same_bits() -> None:
+    assert len({digest(threads) for threads in (1, 2, 3, 7)}) == 1
+
+
+def test_every_item_is_worked_on_once() -> None:
+    for count, grain in ((0, 1), (1, 1), (7, 2), (1000, 1), (1000, 300)):
+        seen = [0] * count
+
+        def work(lo: int, hi: int, seen: list[int] = seen) -> None:
+            time.sleep(0.001)
+            for k in range(lo, hi):
+                seen[k] += 1
+
+        spread(work, count, grain)
+        assert seen == [1] * count
+
+
+def test_what_goes_wrong_in_a_thread_comes_out() -> None:
+    def work(lo: int, hi: int) -> None:
+        raise ValueError(f"{lo} to {hi}")
+
+    with pytest.raises(ValueError, match="0 to"):
+        spread(work, 1000, 1)
