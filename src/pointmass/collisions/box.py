@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.collisions.collider import Array, Collider, Contact
-from pointmass.collisions.laws import along
+from pointmass.collisions.laws import all_of, along, any_of
 from pointmass.collisions.plane import Plane
 from pointmass.errors import InvalidInput, finite_array
 from pointmass.laws import parameter
@@ -70,6 +70,13 @@ class Box(Collider):
         face = (where(first, 1.0, 0.0), where(second, 1.0, 0.0), where(first | second, 0.0, 1.0))
         n = along(out, length(out), face)
         return Vector(sign * where(p < 0.0, -a, a) for p, a in zip(x, n, strict=True))
+
+    @staticmethod
+    def apart_law(points: Sequence[Triple], room: Number, *shape: Number) -> Any:
+        """All beyond one of the faces; a room is made of planes."""
+        *half, sign = shape
+        beyond = [all_of(h + room < s * p[k] for p in points) for k, h in enumerate(half) for s in (1.0, -1.0)]
+        return any_of(beyond) & (sign > 0.0)
 
     @property
     def shape(self) -> tuple[float, ...]:

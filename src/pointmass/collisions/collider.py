@@ -75,6 +75,14 @@ class Collider(Described, ABC):
     def normal_law(x: Triple, *shape: Number) -> Triple:
         """Gradient of the distance, a unit vector."""
 
+    @staticmethod
+    def apart_law(points: Sequence[Triple], room: Number, *shape: Number) -> Any:
+        """Whether all that lies between points, relative to the place, is farther away than `room` [m].
+
+        A quick test: it may fail to hold where it could, and never holds where it must not. False: there is none.
+        """
+        return False
+
     @property
     @abstractmethod
     def shape(self) -> tuple[float, ...]:
@@ -135,7 +143,7 @@ class Collider(Described, ABC):
 
 @cache
 def _traced(kind: type[Collider], count: int) -> Laws:
-    return laws_of(kind.__name__, kind.distance_law, kind.normal_law, count, kind.curved)
+    return laws_of(kind.__name__, kind.distance_law, kind.normal_law, kind.apart_law, count, kind.curved)
 
 
 def _components(x: Array) -> list[NDArray[np.float64]]:

@@ -103,8 +103,8 @@ class Contacts:
             if len(rows):
                 a = acceleration() if a is None else a
                 self._stand(surface, rows, gap[rows], x, v, m, a, t)
-        rows = np.concatenate([s.rows for s in self.standing]) if self.standing else np.zeros(0, np.intp)
-        self._several = np.bincount(rows, minlength=len(x)) > 1
+        on = np.concatenate([s.rows for s in self.standing]) if self.standing else np.zeros(0, np.intp)
+        self._several = np.bincount(on, minlength=len(x)) > 1
         if self.order == 2:
             self._relax(np.ones(len(x), bool), lambda stand, go: self._stop(stand, v, t, go))
         for stand in self.standing:
@@ -252,7 +252,7 @@ class Contacts:
             stand.pressed = np.ones(len(rows), bool)
         else:
             stand.pressed = np.where(go, load > 0, stand.pressed)
-            load = np.maximum(load, 0)
+            load = np.where(load > 0, load, 0)
         given = load[:, None] * normal
         if friction and self.order == 2 and stand.surface.friction > 0:
             force, held = self._friction(stand, free - into[:, None] * normal, load)
@@ -291,7 +291,7 @@ class Contacts:
         v[rows] = np.where(held[:, None], motion, v[rows])
         now = rows_dot(v[rows] - motion, stand.slide)
         stopped = went & (now < 0) & (stand.speed > 0)
-        way = 0.5 * h[rows] * stand.speed * stand.speed / np.where(stopped, stand.speed - now, 1)  # until it stopped
+        way = 0.5 * h[rows] * (stand.speed * stand.speed) / np.where(stopped, stand.speed - now, 1)  # until it stopped
         beyond = rows_dot(x[rows] - place - stand.start, stand.slide) - way
         x[rows] = np.where(stopped[:, None], x[rows] - beyond[:, None] * stand.slide, x[rows])
         v[rows] = np.where(stopped[:, None], v[rows] - now[:, None] * stand.slide, v[rows])

@@ -26,5 +26,5 @@ def bounce(
         rows, normal = rows[hit[rows]], normal[hit[rows]]
         motion = surface.velocity(t[rows])
         v[rows] = respond(v[rows], normal, motion, surface.restitution, surface.friction)
-        x[rows] -= np.minimum(gap[rows], 0)[:, None] * normal
+        x[rows] -= np.where(gap[rows] < 0, gap[rows], 0)[:, None] * normal
     return hit

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import reduce
+from operator import and_, or_
 from typing import Any
 
 from pointmass.tracing.functions import Number, Triple, dot, where
@@ -22,17 +24,25 @@ class Laws:
     distance : (x, shape) -> signed distance [m].
     normal : (x, shape) -> unit normal to the free side, three numbers.
     bending : (x, v, shape) -> v . H v [m/s^2], with H the Hessian of the distance; exact, from the normal.
+    apart : (four points, room, shape) -> 1 if their convex hull is farther away than `room` [m], 0 if that is not sure;
+        None if the kind has no such test.
     """
 
     distance: Traced
     normal: Traced
     bending: Traced
+    apart: Traced | None
 
 
 def laws_of(
-    name: str, distance: Callable[..., Number], normal: Callable[..., Triple], count: int, curved: bool
+    name: str,
+    distance: Callable[..., Number],
+    normal: Callable[..., Triple],
+    apart: Callable[..., Any],
+    count: int,
+    curved: bool,
 ) -> Laws:
-    """Trace a distance and a normal, each a function of (x, *shape), with so many numbers of shape."""
+    """Trace the laws of a kind of surface: see `Collider`. `count` is how many numbers its shape has."""
     x, v, shape = {"x": "vector"}, {"v": "vector"}, {f"s{k}": "scalar" for k in range(count)}
     across = trace(normal, x | shape, 3, f"{name}.normal")
     turn = across.jacobian(*vector_names("x"))
@@ -43,10 +53,13 @@ def laws_of(
         slopes = _replayed(turn.program, dict(zip(turn.inputs, (*x, *shape), strict=True)))
         return dot(v, [dot(slopes[3 * k : 3 * k + 3], v) for k in range(3)])  # type: ignore[arg-type]
 
+    points = {f"b{k}": "vector" for k in range(4)}
+    hull = trace(lambda *a: apart(a[:4], *a[4:]), points | {"room": "scalar"} | shape, 1, f"{name}.apart")
     return Laws(
         trace(distance, x | shape, 1, f"{name}.distance"),
         across,
         trace(bending, x | v | shape, 1, f"{name}.bending"),
+        hull if hull.depends_on else None,
     )
 
 
@@ -55,6 +68,16 @@ def along(a: Triple, size: Number, otherwise: Triple = UP) -> Vector:
     long = size > 0.0
     safe = where(long, size, 1.0)
     return Vector(where(long, p / safe, q) for p, q in zip(a, otherwise, strict=True))
+
+
+def all_of(conditions: Iterable[Any]) -> Any:
+    """Whether all conditions hold."""
+    return reduce(and_, conditions)
+
+
+def any_of(conditions: Iterable[Any]) -> Any:
+    """Whether one of the conditions holds."""
+    return reduce(or_, conditions)
 
 
 def _replayed(program: Program, inputs: dict[str, Any]) -> list[Symbol]:

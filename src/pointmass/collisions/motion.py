@@ -27,6 +27,7 @@ class Motion:
     Attributes
     ----------
     fixed : the place, shape (3,), if it never changes; else None.
+    parameters : place, velocity and acceleration.
 
     Raises
     ------
@@ -40,6 +41,7 @@ class Motion:
             raise InvalidInput(f"{name} of a collider may depend on t and nothing else")
         self._velocity = self._place.rate()
         self._acceleration = self._velocity.rate()
+        self.parameters = self._place, self._velocity, self._acceleration
         start = self._place.at(0.0)
         self.fixed: Array | None = np.array(start, np.float64) if self._place.constant else None
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.collisions.collider import Array, Collider, Contact, unit
+from pointmass.collisions.laws import all_of
 from pointmass.laws.parameter import Vector
 from pointmass.tracing.functions import Number, Triple, dot
 
@@ -42,12 +44,15 @@ class Plane(Collider):
 
     @staticmethod
     def distance_law(x: Triple, *shape: Number) -> Number:
-        *normal, offset = shape
-        return dot(x, normal) - offset
+        return dot(x, shape[:3]) - shape[3]
 
     @staticmethod
     def normal_law(x: Triple, *shape: Number) -> Triple:
         return shape[:3]
+
+    @staticmethod
+    def apart_law(points: Sequence[Triple], room: Number, *shape: Number) -> Any:
+        return all_of(dot(p, shape[:3]) > shape[3] + room for p in points)
 
     @property
     def shape(self) -> tuple[float, ...]:

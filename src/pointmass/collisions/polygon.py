@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.collisions.collider import Array, Collider, Contact
-from pointmass.collisions.laws import along
+from pointmass.collisions.laws import all_of, along, any_of
 from pointmass.errors import InvalidInput, finite_array, number
 from pointmass.laws import parameter
 from pointmass.tracing.functions import Number, Triple, dot, length, maximum, minimum, scale, sub, where
@@ -54,6 +54,13 @@ class Polygon(Collider):
         d = _from_nearest(x, shape)
         return along(d, length(d), shape[-4:-1])
 
+    @staticmethod
+    def apart_law(points: Sequence[Triple], room: Number, *shape: Number) -> Any:
+        """All above the plate, all below, or all beyond one of its edges."""
+        corners, outward, normal, half = _parts(shape)
+        sides = [(corners[0], normal), (corners[0], scale(-1.0, normal)), *zip(corners, outward, strict=True)]
+        return any_of(all_of(half + room < dot(sub(p, c), n) for p in points) for c, n in sides)
+
     @property
     def shape(self) -> tuple[float, ...]:
         """The corners, the directions out of the edges, the normal, half the thickness."""
@@ -86,10 +93,15 @@ class Polygon(Collider):
         return n, outward
 
 
-def _from_nearest(x: Triple, shape: Sequence[Number]) -> Vector:
-    """From the nearest point of the flat polygon to x."""
+def _parts(shape: Triple) -> tuple[list[Triple], list[Triple], Triple, Number]:
+    """Corners, directions out of the edges, normal, and half the thickness."""
     *triples, normal = (shape[k : k + 3] for k in range(0, len(shape) - 1, 3))
-    corners, outward = triples[: len(triples) // 2], triples[len(triples) // 2 :]
+    return triples[: len(triples) // 2], triples[len(triples) // 2 :], normal, shape[-1]
+
+
+def _from_nearest(x: Triple, shape: Triple) -> Vector:
+    """From the nearest point of the flat polygon to x."""
+    corners, outward, normal, _ = _parts(shape)
     best = scale(dot(sub(x, corners[0]), normal), normal)
     outside = dot(sub(x, corners[0]), outward[0]) > 0.0
     for corner, out in zip(corners[1:], outward[1:], strict=True):

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.collisions.collider import Array, Collider, Contact
-from pointmass.collisions.laws import UP, along
+from pointmass.collisions.laws import UP, all_of, along
 from pointmass.errors import number
 from pointmass.laws.parameter import Vector
-from pointmass.tracing.functions import Number, Triple, length
+from pointmass.tracing.functions import Number, Triple, dot, length, where
 
 
 class Sphere(Collider):
@@ -50,7 +51,18 @@ class Sphere(Collider):
 
     @staticmethod
     def normal_law(x: Triple, *shape: Number) -> Triple:
-        return shape[1] * along(x, length(x))
+        radial = along(x, length(x))
+        return shape[1] * radial[0], shape[1] * radial[1], shape[1] * radial[2]
+
+    @staticmethod
+    def apart_law(points: Sequence[Triple], room: Number, *shape: Number) -> Any:
+        """Beyond the tangent plane that the first point looks at; a bowl: all within."""
+        radius, sign = shape
+        first, outer, inner = points[0], radius + room, radius - room
+        beyond = [dot(p, first) for p in points]
+        far = all_of((d > 0.0) & (outer * outer * dot(first, first) < d * d) for d in beyond)
+        within = all_of(dot(p, p) < inner * inner for p in points) & (inner > 0.0)
+        return where(sign > 0.0, far, within)
 
     @property
     def shape(self) -> tuple[float, ...]:

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.collisions.collider import Array, Collider, lengths, rows_dot
-from pointmass.solvers.events import first_root
 
 RESOLUTION = 2.0**-50  # of a fraction of the way
+ROOT_STEPS = 128  # every second one halves the bracket or the step
 MOST_CHORDS = 4096
 NEWTON_STEPS = 60
 SAMPLES = (0.0, 0.5, 1.0)  # of a step, where the acceleration of a moving surface is looked at
@@ -96,6 +96,12 @@ class _Approach:
     def gap(self, theta: Array) -> Array:
         return self.gap_at(self.local(theta))
 
+    def slope(self, theta: Array) -> Array:
+        """d gap / d theta, shape (k,)."""
+        motion = self.surface.velocity(self.paths.time(theta))
+        normal = self.surface.local_normal(self.local(theta))
+        return rows_dot(normal, self.paths.velocity(theta) - motion) * self.paths.h
+
     def gap_at(self, local: Array) -> Array:
         return self.surface.local_distance(local) - self.paths.radius - self.level
 
@@ -127,10 +133,34 @@ def first_hit(surface: Collider, paths: Paths) -> Array:
     low, high = _brackets(approach)
     crossed = np.isfinite(high)
     if crossed.any():
-        gap = approach.take(crossed).gap
-        root = first_root(gap, low[crossed], high[crossed], resolution=RESOLUTION)[0]
-        theta[rows[crossed]] = np.where(np.isfinite(root), root, low[crossed])
+        theta[rows[crossed]] = _root(approach.take(crossed), low[crossed], high[crossed])
     return theta
+
+
+def _root(approach: _Approach, low: Array, high: Array) -> Array:
+    """A crossing between `low`, where the gap is at least 0, and `high`, where it is less; on the free side.
+
+    Newton's method within a bracket. It aims by RESOLUTION before the root, to end on the free side. Where a step
+    leaves the bracket or is not half as long as the one before, the bracket is halved instead.
+    """
+    a, b, last = low, high, high - low
+    g_low, g_high = approach.gap(low), approach.gap(high)
+    x = a + (b - a) * (g_low / (g_low - g_high))
+    open_ = np.ones(len(x), bool)
+    for _ in range(ROOT_STEPS):
+        gap, slope = approach.gap(x), approach.slope(x)
+        free, falls = gap >= 0, slope < 0
+        a, b = np.where(open_ & free, x, a), np.where(open_ & ~free, x, b)
+        step = -gap / np.where(falls, slope, -1)
+        arrived = free & falls & (step <= 2 * RESOLUTION)
+        aim = x + step - RESOLUTION
+        newton = falls & (a < aim) & (aim < b) & (np.abs(step) <= 0.5 * last)
+        x = np.where(newton, aim, 0.5 * (a + b))
+        last = np.where(newton, np.abs(step), 0.5 * (b - a))
+        open_ &= ~arrived & (b - a > RESOLUTION) & (a < x) & (x < b)
+        if not open_.any():
+            break
+    return a
 
 
 def _swing(surface: Collider, paths: Paths) -> Array:
@@ -177,14 +207,15 @@ def _deepest(approach: _Approach, a: Array, b: Array) -> Array:
 
 def _newton(approach: _Approach, a: Array, b: Array) -> Array:
     """Fraction from a at which the gap is first 0; inf if it never is."""
-    s = np.zeros(len(a))
+    s, open_ = np.zeros(len(a)), np.ones(len(a), bool)
     for _ in range(NEWTON_STEPS):
-        point = a + np.where(np.isfinite(s), s, 0)[:, None] * (b - a)
+        point = a + np.where(open_, s, 0)[:, None] * (b - a)
         gap = approach.gap_at(point)
         slope = rows_dot(approach.surface.local_normal(point), b - a)
         with np.errstate(divide="ignore", invalid="ignore"):
             step = np.where(gap <= 0, 0.0, np.where(slope < 0, -gap / slope, np.inf))
-        s = np.where(s + step > 1, np.inf, s + step)
-        if not (np.isfinite(s) & (step > 1e-15)).any():
+        s = np.where(open_, np.where(s + step > 1, np.inf, s + step), s)
+        open_ &= np.isfinite(s) & (step > 1e-15)
+        if not open_.any():
             break
     return s

@@ -63,7 +63,7 @@ class ReferenceEngine:
     stats: Stats = field(default_factory=Stats)
 
     def __post_init__(self) -> None:
-        surfaces = [s for c in self.system.colliders for s in c.surfaces]
+        surfaces = surfaces_of(self.system)
         self._swept = [s for s in surfaces if s.contact == "swept"]
         self._discrete = [s for s in surfaces if s.contact == "discrete"] if self.system.order == 2 else []
         self._walls = [*self._swept, *self._discrete]
@@ -386,6 +386,12 @@ class ReferenceEngine:
         clock = np.full(int(self._islands.max(initial=-1)) + 1, -np.inf)
         np.maximum.at(clock, self._islands, births)
         return clock
+
+
+def surfaces_of(system: ParticleSystem) -> list[Collider]:
+    """The surfaces of all colliders in the order in which they act: those of swept contact first."""
+    surfaces = [s for c in system.colliders for s in c.surfaces]
+    return sorted(surfaces, key=lambda s: s.contact == "discrete")
 
 
 def _roundoff(x: Array) -> Array:

@@ -1,0 +1,203 @@
+"""The printed functions of colliders against the reference path: the same bits, and nothing is clear that is not."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import pointmass as pm
+from pointmass.engine import store
+from pointmass.engine.contact import ContactText
+from pointmass.engine.reference import ReferenceEngine, surfaces_of
+from pointmass.solvers import SOLVERS
+
+PLATE = [[-1, 0.3, -1], [-1, 0.3, 1], [0.4, 0, 1], [0.4, 0, -1]]
+WORLDS = {
+    "floor": lambda **k: [pm.Plane(normal=(0.1, 1, 0), **k)],
+    "room": lambda **k: [pm.Box(size=(2, 2, 2), inside=True, **k)],
+    "ball": lambda **k: [pm.Sphere(center=(0, -1, 0), radius=0.9, **k), pm.Plane((0, -1, 0), **k)],
+    "bowl": lambda **k: [pm.Sphere(radius=1.1, inside=True, **k)],
+    "block": lambda **k: [pm.Box(center=(0, -1, 0), size=(1.5, 1.8, 1.2), **k)],
+    "plates": lambda **k: [pm.Polygon(PLATE, **k), pm.Polygon(PLATE[:3], shift=(0, "-0.5*t", 0.2), thickness=0.1, **k)],
+    "wedge": lambda **k: [pm.Plane(normal=(s, 0.3, 0), **k) for s in (1, -1)],
+    "press": lambda **k: [pm.Plane((0, "-1+t", 0), **k), pm.Plane((0, "1-t", "t"), (0, -1, 0.1), **k)],
+    "paddle": lambda **k: [pm.Sphere(center=("sin(9*t)", 0, "0.2*t"), radius=0.5, **k), pm.Plane((0, -1, 0), **k)],
+    "lift": lambda **k: [pm.Box(center=(0, "-1+0.3*sin(8*t)", 0), size=(1, 1.8, 1), **k)],
+}
+FLOATS = st.floats(-1.4, 1.4)
+POINTS = st.tuples(FLOATS, FLOATS, FLOATS)
+
+
+@cache
+def printed(text, dtype="float64"):
+    return store.plain("contacts", text, dtype)
+
+
+class Filter:
+    """Contacts of all particles, each on its own."""
+
+    def __init__(self, engine):
+        self.engine = engine
+
+    def forces(self, t, x, v, m, f):
+        e = self.engine
+        for i in range(len(x)):
+            now = t[i] if isinstance(t, np.ndarray) else t
+            f[i] = e.do["bear"](e.table, e.scratch, i * e.text.record, now, *x[i], *v[i], m[i], *f[i])
+
+    def projection(self, n):
+        e = self.engine
+        blocks = np.zeros((n, 9))
+        for i in range(n):
+            e.do["project"](e.table, e.scratch, i * e.text.record, blocks[i], np.zeros(18))
+        return blocks.reshape(n, 3, 3)
+
+
+class ScalarEngine(ReferenceEngine):
+    """The reference engine with its collisions made by the printed functions, particle by particle."""
+
+    def __init__(self, system, solver, functions=None):
+        super().__init__(system, solver)
+        self.text = ContactText(surfaces_of(system), system.order, solver.implicit, "float64")
+        self.do = functions(self.text.text) if functions else printed(self.text.text)
+        self.table = self.text.table()
+        self.scratch = np.zeros(len(system.particles) * self.text.record)
+
+    def _prepare(self, clock, h, y):
+        system, p, do = self.system, self.system.particles, self.do
+        y = y.copy()
+        x, v = system.split(y)
+        t = clock[self._islands]
+        system.filter = None
+        system.clear_forces()
+        system.calculate_forces(t, x, v)
+        a = p.f * p.w[:, None] if system.order == 2 else p.f.copy()
+        for i in range(len(p)):
+            o = i * self.text.record
+            self.scratch[o] = 0
+            if h[self._islands[i]] > 0 and not p.pinned[i] and do["near"](self.table, t[i], *x[i], p.radius[i]):
+                v[i] = do["find"](self.table, self.scratch, o, t[i], *x[i], *v[i], p.m[i], *a[i], p.radius[i])
+        system.filter = Filter(self) if self.scratch[:: self.text.record].any() else None
+        return y
+
+    def _collide(self, step, h):
+        system, p, do, islands = self.system, self.system.particles, self.do, self._islands
+        clock, reset = np.full(len(h), np.nan), np.zeros(len(h), bool)
+        length = h[islands]
+        start = np.broadcast_to(step.t, system.dim)[: 3 * len(p) : 3]
+        end = start + length
+        y = step.y1.copy()
+        x, v = system.split(y)
+        x0, v0 = system.split(step.y0)
+        moved = np.flatnonzero((length > 0) & ~p.pinned)
+        now, linked = end.copy(), []
+        for i in moved:
+            o, radius = i * self.text.record, p.radius[i]
+            x[i], v[i] = np.reshape(
+                do["settle"](self.table, self.scratch, o, end[i], length[i], *x[i], *v[i], radius), (2, 3)
+            )
+            *state, hit = do["bounce"](self.table, end[i], *x[i], *v[i], radius)
+            reset[islands[i]] |= hit
+            x[i], v[i] = np.reshape(state, (2, 3))
+        planned = x.copy(), v.copy()
+        for i in moved:
+            o, radius = i * self.text.record, p.radius[i]
+            *state, now[i], events, gx, gy, gz = do["strike"](
+                self.table, self.scratch, o, bool(self._alone[i]), int(self._events[i]), *x0[i], *v0[i], *x[i], *v[i],
+                start[i], length[i], radius,
+            )  # fmt: skip
+            if events > self._events[i]:
+                self._events[i], self._ground[i] = events, (gx, gy, gz)
+                reset[islands[i]] = True
+                if not self._alone[i] and events <= 8:
+                    linked.append(i)
+            x[i], v[i] = np.reshape(state, (2, 3))
+            if now[i] < end[i]:
+                clock[islands[i]] = now[i]
+        if linked:
+            rows = np.array(linked)
+            chord = (planned[0] - x0)[rows] / length[rows][:, None]
+            self._pay(rows, chord, planned, x, v, end)
+        began, when = self._began
+        for i in moved:
+            x[i], v[i] = np.reshape(
+                do["evict"](self.table, now[i], *x[i], *v[i], p.radius[i], *began[i], when[i]), (2, 3)
+            )
+        self._keep(step, h, 0.0)
+        system.filter = None
+        return y, clock, reset
+
+
+def pair_of_engines(world, contact, solver, x, v, radius, m, forces, functions=None, **material):
+    engines = []
+    for kind in (ReferenceEngine, lambda *a: ScalarEngine(*a, functions)):
+        particles = pm.Particles(np.atleast_2d(x), np.atleast_2d(v), radius=radius, m=m)
+        made = [pm.Springs([(0, 1)], k_s=20.0)] if len(particles) > 1 else []
+        system = pm.ParticleSystem(particles, [*forces(), *made], WORLDS[world](contact=contact, **material))
+        engines.append(kind(system, solver))
+    return engines
+
+
+def same_steps(engines, dt, steps):
+    for k in range(steps):
+        ends = []
+        for e in engines:
+            try:
+                e.step(k * dt, (k + 1) * dt)
+            except pm.Diverged as error:
+                ends.append(str(error))
+            else:
+                ends.append(e.system.get_state())
+        np.testing.assert_array_equal(ends[0], ends[1])
+        if isinstance(ends[0], str):
+            return
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    world=st.sampled_from(sorted(WORLDS)),
+    contact=st.sampled_from(["swept", "swept", "discrete"]),
+    name=st.sampled_from(["symplectic_euler", "leapfrog", "rk4", "dopri5", "implicit_euler", "bdf2"]),
+    x=POINTS,
+    v=POINTS,
+    speed=st.sampled_from([0.0, 1.0, 30.0, 1e3]),
+    radius=st.sampled_from([0.0, 0.05]),
+    tilt=st.sampled_from([0.0, 3.0]),
+    friction=st.sampled_from([0.0, 0.3, 2.0]),
+    restitution=st.sampled_from([0.0, 0.4, 1.0]),
+    dt=st.sampled_from([1 / 20, 1 / 100, 1 / 240]),
+)
+def test_the_same_bits(world, contact, name, x, v, speed, radius, tilt, friction, restitution, dt):
+    def forces():
+        return [pm.Gravity((tilt, -9.81, 0.3 * tilt)), pm.Drag(0.1)]
+
+    engines = pair_of_engines(
+        world, contact, SOLVERS[name](), x, speed * np.array(v), radius, 0.7, forces,
+        friction=friction, restitution=restitution,
+    )  # fmt: skip
+    same_steps(engines, dt, 12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(world=st.sampled_from(sorted(WORLDS)), seed=st.integers(0, 2**32 - 1), speed=st.sampled_from([1.0, 30.0, 1e3]))
+def test_linked_particles_finish_their_step(world, seed, speed):
+    rng = np.random.default_rng(seed)
+    x, v = rng.uniform(-1.4, 1.4, (2, 3)), speed * rng.normal(size=(2, 3))
+    engines = pair_of_engines(world, "swept", pm.Leapfrog(), x, v, 0.02, 0.7, lambda: [pm.Gravity()])
+    same_steps(engines, 1 / 100, 8)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    world=st.sampled_from(sorted(WORLDS)), contact=st.sampled_from(["swept", "discrete"]),
+    name=st.sampled_from(["euler", "rk4", "implicit_euler"]), x=POINTS, radius=st.sampled_from([0.0, 0.05]),
+)  # fmt: skip
+def test_a_flow(world, contact, name, x, radius):
+    engines = pair_of_engines(
+        world, contact, SOLVERS[name](), x, (0, 0, 0), radius, 1.0, lambda: [pm.Flow(velocity=("sin(3*y)", -1.0, 0.5))]
+    )
+    same_steps(engines, 1 / 30, 8)
