@@ -130,7 +130,10 @@ class ContactText:
 
     def _clear_lines(self) -> tuple[list[str], list[str], str]:
         before = ["third = h * 0.3333333333333333"]
-        ends = [(f"a{a}", f"{a}0 + third * {r}0", f"c{a}", f"{a}1 - third * {r}1") for a, r in zip("xyz", "uvw", strict=True)]
+        ends = [
+            (f"a{a}", f"{a}0 + third * {r}0", f"c{a}", f"{a}1 - third * {r}1")
+            for a, r in zip("xyz", "uvw", strict=True)
+        ]
         inside = [line for a, first, c, second in ends for line in (f"{a} = {first}", f"{c} = {second}")]
         controls = [*PATH[:3], "ax", "ay", "az", "cx", "cy", "cz", *PATH[6:9]]
         inside += [

@@ -98,7 +98,6 @@ class Engine:
         system = self.system
         return [
             *(force.name for force in system.forces if not isinstance(force, (UnaryForce, ElementForce))),
-            *(collider.name for collider in system.colliders),
             *([] if _has_step(self.solver) else [self.solver.name]),
         ]
 
@@ -218,7 +217,7 @@ class Engine:
     def _made_groups(self, islands: Rows, newborn: NDArray[np.bool_] | None) -> list[Group]:
         size = np.bincount(islands)[islands]
         alone = size == 1 if newborn is None else (size == 1) & ~newborn
-        alone &= control_of(self.solver) is None
+        alone &= control_of(self.solver) is None and not self.system.colliders
         groups = [self._group(SinglesKernel, np.flatnonzero(alone), islands)] if alone.any() else []
         large = size >= LARGE
         for island in np.unique(islands[large]):

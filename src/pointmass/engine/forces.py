@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.engine.binding import Binder, Table, Text
+from pointmass.engine.contact import ContactText
 from pointmass.engine.printing import indented, literal
+from pointmass.engine.reference import surfaces_of
 from pointmass.laws.elements import ElementForce
 from pointmass.laws.unary import UnaryForce
 from pointmass.system import ParticleSystem
@@ -54,11 +56,19 @@ class Deriv:
     ----------
     text : the function.
     families : of elements, in the order of the forces.
-    arguments : arrays that it takes besides state and result.
+    contact : what the colliders do to a particle, if there are any.
+
+    Parameters
+    ----------
+    parallel : whether its loops are those of all threads.
+    lagged : whether resting contact is that of the start of a piece (implicit solvers).
     """
 
-    def __init__(self, system: ParticleSystem, parallel: bool) -> None:
+    def __init__(self, system: ParticleSystem, parallel: bool, lagged: bool) -> None:
         self.system = system
+        self.contact: ContactText | None = None
+        if system.colliders:
+            self.contact = ContactText(surfaces_of(system), system.order, lagged, str(system.particles.dtype))
         self.order = system.order
         self.binder = Binder(system.particles, Table("C"))
         self.families: list[Elements] = []
@@ -70,12 +80,14 @@ class Deriv:
     @property
     def data(self) -> list[str]:
         """Names of the arrays of a kernel that are the same for all islands."""
-        return [*self.binder.arrays, *(a for family in self.families for a in family.arguments)]
+        arrays = [*self.binder.arrays, *(a for family in self.families for a in family.arguments)]
+        return arrays if self.contact is None else [*arrays, "F"]
 
     @property
     def call(self) -> str:
         """The arguments of a call that all islands' calls share, as text."""
-        return ", ".join(["base", "n", *self.data, *(a for f in self.families for a in f.locals)])
+        own = [a for f in self.families for a in f.locals] + ["K"] * (self.contact is not None)
+        return ", ".join(["base", "n", *self.data, *own])
 
     def _printed(self) -> str:
         elements, sums = [], []
@@ -99,6 +111,7 @@ class Deriv:
             "o_z = np.uintp(3 * i + 2)",
             *(f"f_{a} = R(0)" for a in "xyz"),
             *sums,
+            *self._bear(),
             f"w = {w}",
             "free = w != 0",
             *(line.replace("[o", "[o_") for line in last),
@@ -115,7 +128,21 @@ class Deriv:
             "    return status",
             "",
         ]
-        return self.binder.functions + "\n".join(lines)
+        contact = "" if self.contact is None else self.contact.text
+        return contact + self.binder.functions + "\n".join(lines)
+
+    def _bear(self) -> list[str]:
+        """Resting contact: a filter on the sum of all forces, between calculate and gather."""
+        if self.contact is None:
+            return []
+        state = [f"np.float64({q}[o_{a}])" if q == "x" or self.order == 2 else "0.0" for q in "xv" for a in "xyz"]
+        force = ", ".join(f"np.float64(f_{a})" for a in "xyz")
+        mass = f"np.float64({self.binder.attribute('m', 'g')})"
+        return [
+            f"if K[{self.contact.record} * i] > 0:",
+            f"    b_x, b_y, b_z = bear(F, K, {self.contact.record} * i, t, {', '.join(state)}, {mass}, {force})",
+            "    f_x, f_y, f_z = R(b_x), R(b_y), R(b_z)",
+        ]
 
     def _elements(self, force: ElementForce, tag: str) -> tuple[list[str], list[str]]:
         """Statements that evaluate elements into their buffer, and those that add them up on a particle."""

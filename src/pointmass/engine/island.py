@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from pointmass.engine import store
 from pointmass.engine.adaptive import control_text
 from pointmass.engine.forces import Deriv, Incidence, incidence
+from pointmass.engine.impacts import WORK, Impacts
 from pointmass.engine.printing import indented
 from pointmass.engine.steps import StepText, step_text
 from pointmass.engine.threads import spread
-from pointmass.solvers.advance import NEARLY, Stats
+from pointmass.solvers.advance import NEARLY, SET_BACKS, Stats
 from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.control import control_of
 from pointmass.system import ParticleSystem
@@ -95,15 +96,30 @@ class IslandKernel:
     def __init__(self, system: ParticleSystem, solver: Solver, parallel: bool) -> None:
         self.system, self.solver = system, solver
         self.dtype = str(system.particles.dtype)
-        self.deriv = Deriv(system, parallel)
-        self.text = self._printed(parallel)
+        self.deriv = Deriv(system, parallel, solver.implicit)
+        self.impacts = self._impacts()
+        self.text = self._printed()
 
-    def _printed(self, parallel: bool) -> str:
+    def _impacts(self) -> Impacts | None:
+        deriv = self.deriv
+        if deriv.contact is None:
+            return None
+        row = [deriv.binder.attribute(name, "g") for name in ("w", "m", "radius")]
+        return Impacts(deriv.contact, self.system.order, deriv.loop, deriv.flags, deriv.call, *row)
+
+    def _printed(self) -> str:
         deriv, control = self.deriv, control_of(self.solver)
-        step = step_text(self.solver, self.system.order, self.dtype, deriv.loop, self.system.velocity_dependent)
+        depends = self.system.velocity_dependent
+        step = step_text(self.solver, self.system.order, self.dtype, deriv.loop, depends, self.impacts is not None)
         work = [*step.work, "x1", "v1"]
-        state = f"{deriv.call}, clock, end, x, v, {', '.join(work)}, control, done"
+        extra = []
+        if self.impacts is not None:
+            work += [*WORK, "av"]
+            extra = ["began", "events", "paid", "when"]
+        state = ", ".join([deriv.call, "clock, end, x, v", *work, *extra, "control, done"])
         parts = [REACHED, deriv.text, "\n\n", self._slope()]
+        if self.impacts is not None:
+            parts.append(self.impacts.text)
         if control is not None:
             parts.append(control_text(control, self.system.order, self.dtype, deriv.call))
         return "".join([*parts, self._advance(step, state), self._run(work, state)])
@@ -145,23 +161,64 @@ class IslandKernel:
                 f"    status |= {NO_STEP} if verdict == 2 else 0",
                 "    continue",
             ]
+        before, after, beyond = [], [], ["clock = end if last else clock + h"]
+        if self.impacts is not None:
+            before = [f"standing, bad = prepare({deriv.call}, clock, x, v, av)", "status |= bad"]
+            after = [
+                f"for q in {deriv.loop}(3 * n):",
+                *indented([f"{q}0[q] = {q}[q]" for q in "xv"[: self.system.order]], 1),
+            ]
+            beyond = [
+                f"now, hits = collide({deriv.call}, n == 1, clock, h, x, v, events, paid, when, began, {', '.join(WORK)})",
+                "if hits > 0:",
+                *indented(self._anew(), 1),
+                "if now < clock + h:",
+                "    backs += 1",
+                f"    status |= {NO_STEP} if backs > {SET_BACKS} else 0",
+                "    clock = now",
+                "else:",
+                "    clock = end if last else clock + h",
+            ]
         lines = [
             "status = 0",
+            "backs = 0",
+            *self._begin(),
             "while clock < end and status == 0:",
             "    left = end - clock",
             *indented(wanted, 1),
+            *indented(before, 1),
             "    hr = R(h)",
             "    t = clock",
             *indented(trial, 1),
             "    done[0] += 1",
             f"    done[1] += {step.evaluations}",
             *indented(judged, 1),
+            *indented(after, 1),
             f"    for q in {deriv.loop}(3 * n):",
             *indented(keep, 2),
-            "    clock = end if last else clock + h",
+            *indented(beyond, 1),
             "return status",
         ]
         return "\n".join([f"@njit({deriv.flags})", f"def advance({state}):", *indented(lines, 1), "", "", ""])
+
+    def _begin(self) -> list[str]:
+        """At the beginning of a step: nobody has hit anything, and everybody is where the step began."""
+        if self.impacts is None:
+            return []
+        return [
+            "began = clock",
+            f"for i in {self.deriv.loop}(n):",
+            "    events[i] = 0",
+            f"for q in {self.deriv.loop}(3 * n):",
+            "    bx[q] = x[q]",
+        ]
+
+    def _anew(self) -> list[str]:
+        """What the solver remembers is of no use after an impact."""
+        control = control_of(self.solver)
+        if control is None:
+            return ["pass"]
+        return [f"control[{k}] = {value!r}" for k, value in enumerate((0.0, control.floor, 0.0))]
 
     def _run(self, work: list[str], state: str) -> str:
         """The kernel itself: the islands of a group over a span."""
@@ -170,6 +227,10 @@ class IslandKernel:
         ranges += [f"e{f.number} = S{f.number}[island + 1]" for f in deriv.families]
         scratch = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{f.number + 1}], R)" for f in deriv.families]
         scratch += [f"{name} = np.empty(3 * M[0], R)" for name in work]
+        if deriv.contact is not None:
+            scratch.append(f"K = np.zeros({deriv.contact.record} * M[0])")
+            scratch += [f"{name} = np.zeros(M[0], np.int64)" for name in ("events", "paid")]
+            scratch += ["when = np.zeros(1)", "began = 0.0"]
         call = state.replace(", x, v, ", ", xi, vi, ")
         island = [
             "base = first[island]",
@@ -243,6 +304,7 @@ class IslandMembers:
         deriv, count, islands = self.kernel.deriv, len(self.rows), len(self.islands)
         dtype = self.kernel.system.particles.dtype
         data = deriv.binder.data(count, self.order)
+        contact = [] if deriv.contact is None else [deriv.contact.table()]
         starts, most = [], [int(np.diff(self.first).max(initial=0))]
         for family, (elements, found) in zip(deriv.families, self.families, strict=True):
             data += [found.nodes, family.table.array(len(elements), dtype, elements), found.ends, found.entries]
@@ -254,7 +316,21 @@ class IslandMembers:
             control[:] = np.stack([memory[name][self.islands] for name in CONTROL], axis=1)
         status, reach = np.zeros(islands, np.int64), np.zeros((islands, 2))
         grid = (span.t0, span.dt, span.first, span.count)
-        arrays = (self.first, x, v, *data, *starts, np.array(most), begin, *grid, control, work, status, reach)
+        arrays = (
+            self.first,
+            x,
+            v,
+            *data,
+            *contact,
+            *starts,
+            np.array(most),
+            begin,
+            *grid,
+            control,
+            work,
+            status,
+            reach,
+        )
         kernel = self.kernel.functions["run"]
         spread(lambda lo, hi: kernel(lo, hi, *arrays), islands, max(1, GRAIN * islands // count))
         for name, column in zip(CONTROL, control.T, strict=True):

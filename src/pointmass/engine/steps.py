@@ -34,12 +34,19 @@ class StepText:
     error: list[str] = field(default_factory=list)
 
 
-def step_text(solver: Solver, order: int, dtype: str, loop: str, velocity_dependent: bool) -> StepText:
-    """The step of a solver."""
+def step_text(
+    solver: Solver, order: int, dtype: str, loop: str, velocity_dependent: bool, contacts: bool = False
+) -> StepText:
+    """The step of a solver.
+
+    Parameters
+    ----------
+    contacts : whether somebody may be `standing` on a surface: then accelerations depend on velocities.
+    """
     if isinstance(solver, ExplicitRungeKutta):
         return _explicit(solver, order, dtype, loop)
     assert isinstance(solver, Splitting)
-    return _splitting(solver, dtype, loop, velocity_dependent)
+    return _splitting(solver, dtype, loop, velocity_dependent, contacts)
 
 
 def _weighted(weights: Sequence[float], slopes: str, dtype: str) -> str:
@@ -71,12 +78,15 @@ def _explicit(solver: ExplicitRungeKutta, order: int, dtype: str, loop: str) -> 
     return StepText(work, lines, stages, error)
 
 
-def _splitting(solver: Splitting, dtype: str, loop: str, velocity_dependent: bool) -> StepText:
+def _splitting(solver: Splitting, dtype: str, loop: str, velocity_dependent: bool, contacts: bool) -> StepText:
     lines = [f"for q in {loop}(3 * n):", "    x1[q] = x[q]", "    v1[q] = v[q]", "status |= SLOPE(t, x, v, kx, kv)"]
-    fresh = True
+    passes = solver.passes if velocity_dependent else 1
+    evaluations, fresh = 1, True
     for (opening, drift, closing), (before, after) in zip(solver.substeps, solver._times, strict=True):
-        if not fresh:
-            lines.append(f"status |= SLOPE(t + {before!r} * h, x1, v1, kx, kv)")
+        if not fresh or contacts:
+            again = f"status |= SLOPE(t + {before!r} * h, x1, v1, kx, kv)"
+            lines += [again] if not fresh else ["if standing > 0:", f"    {again}"]
+            evaluations += not fresh
         lines += [
             f"kick = {literal(opening, dtype)} * hr",
             f"drift = {literal(drift, dtype)} * hr",
@@ -86,16 +96,15 @@ def _splitting(solver: Splitting, dtype: str, loop: str, velocity_dependent: boo
         ]
         fresh = closing != 0.0 and not velocity_dependent
         if closing != 0.0:
-            lines += _closing(closing, after, solver.passes if velocity_dependent else 1, dtype, loop)
-    evaluations = sum("SLOPE(" in line for line in lines)
+            count = f"{solver.passes} if standing > 0 else {passes}" if contacts else f"{passes}"
+            lines += [
+                f"kick = {literal(closing, dtype)} * hr",
+                f"for q in {loop}(3 * n):",
+                "    before[q] = v1[q]",
+                f"for _ in range({count}):",
+                f"    status |= SLOPE(t + {after!r} * h, x1, v1, kx, kv)",
+                f"    for q in {loop}(3 * n):",
+                "        v1[q] = before[q] + kick * kv[q]",
+            ]
+            evaluations += passes
     return StepText(["kx", "kv", "before"], lines, evaluations)
-
-
-def _closing(closing: float, after: float, passes: int, dtype: str, loop: str) -> list[str]:
-    kick = [
-        f"status |= SLOPE(t + {after!r} * h, x1, v1, kx, kv)",
-        f"for q in {loop}(3 * n):",
-        "    v1[q] = before[q] + kick * kv[q]",
-    ]
-    lines = [f"kick = {literal(closing, dtype)} * hr", f"for q in {loop}(3 * n):", "    before[q] = v1[q]"]
-    return [*lines, *(kick * passes)]
