@@ -25,12 +25,13 @@ jump is v minus the velocity of the chord, (x1 - x0) / h with the solver's x1, a
     clear(P, x0, v0, x1, v1, t, h, radius) -> bool
 
 holds only where all of this would do nothing in a step from x0, v0 to x1, v1. For loops over lanes, whose t and h are
-common, `clear_lines` gives its statements: those before the loop, those for each lane, and the result.
+common, `clear_lines` gives its statements.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,7 @@ from numpy.typing import NDArray
 
 from pointmass.collisions import contact, swept
 from pointmass.collisions.collider import Collider
-from pointmass.engine.printing import indented, statements
+from pointmass.engine.printing import indented, literal, statements
 from pointmass.engine.reference import EVICTIONS, MOST_EVENTS
 from pointmass.laws.parameter import Component, Parameter
 from pointmass.tracing.columns import expanded
@@ -49,8 +50,8 @@ RECORD = {  # of a contact, with the size of each
     **{"ON": 1, "LEVEL": 1, "START": 3, "SLIDE": 3, "SPEED": 1, "LOAD": 1, "GIVEN": 3, "NORMAL": 3},
     **{"PRESSED": 1, "HELD": 1, "STICKS": 1, "CARRIED": 3, "BEND": 1},
 }
-MARK = "# ---------------------------------------------------------------------------------------------------------- printed\n"
-ROUNDING = 1e-13  # of the places between which `clear` looks, on top of eps
+MARK = f"# {'-' * 106} printed\n"
+ROUNDING = {"float64": 1e-13, "float32": 1e-6}  # of the places between which `clear` looks, on top of eps
 PATH = [f"{p}{end}" for end in "01" for p in ("x", "y", "z", "u", "v", "w")]
 
 
@@ -68,15 +69,13 @@ class ContactText:
     ----------
     text : the functions.
     record : how many numbers of scratch a particle takes.
-    clear_lines : statements before a loop over lanes, statements for a lane, and the expression of the result.
     """
 
     def __init__(self, surfaces: Sequence[Collider], order: int, lagged: bool, dtype: str) -> None:
-        self.surfaces = surfaces
+        self.surfaces, self._dtype = surfaces, dtype
         self.record = 1 + sum(RECORD.values()) * len(surfaces)
         self._kinds = list(dict.fromkeys(s.laws for s in surfaces))
         self._motions = list({id(s.motion): s.motion for s in surfaces if s.moves}.values())
-        self.clear_lines = self._clear_lines()
         body = Path(__file__).with_name("contact_text.py").read_text(encoding="utf-8").split(MARK)[1]
         printed = [*_constants(order, lagged, dtype), "", *self._laws(), *self._places()]
         self.text = "\n".join([*printed, body.strip("\n"), "", "", *self._clear()])
@@ -88,8 +87,8 @@ class ContactText:
         for row, s in zip(result, self.surfaces, strict=True):
             motion = 1 + [id(m) for m in self._motions].index(id(s.motion)) if s.moves else 0
             place = [c.value if isinstance(c.value, float) else 0.0 for c in s.motion.parameters[0].components]
-            room = s.eps + ROUNDING * float(np.abs(place).sum())
-            numbers = [self._kinds.index(s.laws), s.contact == "swept", motion, s.bulges]
+            room = s.eps + ROUNDING[self._dtype] * float(np.abs(place).sum())
+            numbers: list[float] = [self._kinds.index(s.laws), s.contact == "swept", motion, s.bulges]
             numbers += [s.restitution, s.friction, s.eps, room, *place, *s.shape]
             row[: len(numbers)] = numbers
         return result
@@ -124,61 +123,122 @@ class ContactText:
 
     def _clear(self) -> list[str]:
         arguments = f"P, {', '.join(PATH)}, t0, h, radius"
-        before, inside, result = self.clear_lines
-        body = [*before, *inside, f"return {result}"]
+        lines = self.clear_lines("float64", "P")
+        third = f"third = h * {1 / 3!r}"
+        body = [*lines.once, *lines.step, third, *lines.lane, f"return {lines.result}"]
         return ["@njit(**FLAGS)", f"def clear({arguments}):", *indented(body, 1), "", ""]
 
-    def _clear_lines(self) -> tuple[list[str], list[str], str]:
-        before = ["third = h * 0.3333333333333333"]
-        ends = [
-            (f"a{a}", f"{a}0 + third * {r}0", f"c{a}", f"{a}1 - third * {r}1")
-            for a, r in zip("xyz", "uvw", strict=True)
-        ]
-        inside = [line for a, first, c, second in ends for line in (f"{a} = {first}", f"{c} = {second}")]
-        controls = [*PATH[:3], "ax", "ay", "az", "cx", "cy", "cz", *PATH[6:9]]
-        inside += [
-            f"size = radius + {ROUNDING!r} * ({' + '.join(f'abs({p})' for p in controls)})",
-            f"way = {' + '.join(f'abs({p})' for p in _legs())}",
-        ]
-        results = []
-        for k, surface in enumerate(self.surfaces):
-            tag = f"q{k}_"
-            apart = surface.laws.apart
-            if apart is not None and not surface.moves:
-                before += [f"{tag}{a} = P[{k}, PLACE + {j}]" for j, a in enumerate("xyz")]
-                points = [f"({p} - {tag}{'xyz'[j % 3]})" for j, p in enumerate(controls)]
-                names = {n: points[j] for j, n in enumerate(n for b in range(4) for n in vector_names(f"b{b}"))}
-                before.append(f"{tag}room = P[{k}, ROOM]")
-                lines, (result,) = _printed(apart, names | _numbers(before, tag, k, apart) | {"room": f"{tag}far"}, tag)
-                inside += [f"{tag}far = {tag}room + size", *lines]
-                results.append(f"({result} != 0.0)")
-            else:
-                results.append(self._clear_by_distance(k, before, inside))
-        return before, inside, " & ".join(results) or "True"
+    def clear_lines(self, dtype: str, table: str) -> ClearLines:
+        """The statements of `clear`, in a precision.
 
-    def _clear_by_distance(self, k: int, before: list[str], inside: list[str]) -> str:
+        Parameters
+        ----------
+        table : name of the array of numbers.
+        """
+        lines = ClearLines([], [], [])
+        far = " + ".join(f"abs({p})" for p in PATH[6:9])
+        lines.lane.append(f"size = radius + {literal(ROUNDING[dtype], dtype)} * ({far})")
+        for k, surface in enumerate(self.surfaces):
+            if "x" not in surface.laws.normal.depends_on and not surface.moves:
+                self._clear_of_plane(k, dtype, table, lines)
+            elif surface.laws.apart is not None and not surface.moves:
+                self._clear_by_hull(k, surface.laws.apart, dtype, table, lines)
+            else:
+                self._clear_by_distance(k, dtype, table, lines)
+        return lines
+
+    def _clear_of_plane(self, k: int, dtype: str, table: str, lines: ClearLines) -> None:
+        """The control points of the path, whose hull it does not leave, are all on the free side."""
+        tag, laws = f"q{k}_", self.surfaces[k].laws
+        lines.once += [f"{tag}{a} = R({table}[{k}, PLACE + {j}])" for j, a in enumerate("xyz")]
+        lines.once.append(f"{tag}room = R({table}[{k}, ROOM])")
+        numbers = _numbers(lines.once, tag, k, laws.distance, table) | _numbers(lines.once, tag, k, laws.normal, table)
+        _, normal = statements(expanded(laws.normal.program), numbers, f"{tag}n_", dtype)
+        gaps = []
+        for j, sign in enumerate("+-"):
+            at = _vector("x", *(f"({a}{j} - {tag}{a})" for a in "xyz"))
+            more, (gap,) = statements(expanded(laws.distance.program), at | numbers, f"{tag}{j}_", dtype)
+            speed = " + ".join(f"{n} * {b}{j}" for n, b in zip(normal, "uvw", strict=True))
+            lines.lane += [*more, f"{tag}e{j} = {gap} {sign} third * ({speed})"]
+            gaps += [gap, f"{tag}e{j}"]
+        lines.lane.append(f"{tag}far = {tag}room + size")
+        lines.results += [f"{gap} > {tag}far" for gap in gaps]
+
+    def _clear_by_hull(self, k: int, apart: Traced, dtype: str, table: str, lines: ClearLines) -> None:
+        """The hull of the control points is apart from the surface."""
+        tag = f"q{k}_"
+        lines.once += [f"{tag}{a} = R({table}[{k}, PLACE + {j}])" for j, a in enumerate("xyz")]
+        lines.once.append(f"{tag}room = R({table}[{k}, ROOM])")
+        inner = [
+            f"{c}{a} = {a}{e} {s} third * {b}{e}"
+            for c, e, s in ("a0+", "c1-")
+            for a, b in zip("xyz", "uvw", strict=True)
+        ]
+        lines.lane += [line for line in inner if line not in lines.lane]
+        controls = [*PATH[:3], "ax", "ay", "az", "cx", "cy", "cz", *PATH[6:9]]
+        points = [f"({p} - {tag}{'xyz'[j % 3]})" for j, p in enumerate(controls)]
+        names = {n: points[j] for j, n in enumerate(n for b in range(4) for n in vector_names(f"b{b}"))}
+        names |= _numbers(lines.once, tag, k, apart, table) | {"room": f"{tag}far"}
+        more, (result,) = statements(expanded(apart.program), names, tag, dtype)
+        lines.lane += [f"{tag}far = {tag}room + size", *more]
+        lines.results.append(f"{result} != R(0)")
+
+    def _clear_by_distance(self, k: int, dtype: str, table: str, lines: ClearLines) -> None:
         """The start is farther away than the whole way of particle and surface, and the end is free."""
         tag, surface = f"q{k}_", self.surfaces[k]
         law = surface.laws.distance
         for j, time in enumerate(("t0", "t0 + h")):
-            before.append(", ".join(f"{tag}{a}{j}" for a in "xyz") + f" = place_of(P, {k}, {time})")
-        before += [f"{tag}near = P[{k}, NEAR]", f"{tag}way = 0.0"]
+            lines.step.append(", ".join(f"{tag}{a}{j}d" for a in "xyz") + f" = place_of({table}, {k}, {time})")
+            lines.step += [f"{tag}{a}{j} = R({tag}{a}{j}d)" for a in "xyz"]
+        lines.once.append(f"{tag}near = R({table}[{k}, NEAR])")
         if surface.moves:
-            moved = ", ".join(f"{tag}{a}1 - {tag}{a}0" for a in "xyz")
-            before[-1] = f"{tag}way = length3({moved}) + swing_of(P, {k}, t0, h)"
-        numbers = _numbers(before, tag, k, law)
+            moved = ", ".join(f"{tag}{a}1d - {tag}{a}0d" for a in "xyz")
+            lines.step.append(f"{tag}way = R(length3({moved}) + swing_of({table}, {k}, t0, h))")
+        else:
+            lines.once.append(f"{tag}way = R(0)")
+        if not any(line.startswith("way =") for line in lines.lane):
+            lines.lane.append(f"way = {' + '.join(f'abs({p})' for p in _legs())}")
+        numbers = _numbers(lines.once, tag, k, law, table)
         gaps = []
         for j in range(2):
             at = _vector("x", *(f"({a}{j} - {tag}{a}{j})" for a in "xyz"))
-            lines, (gap,) = _printed(law, at | numbers, f"{tag}{j}_")
-            inside += lines
+            more, (gap,) = statements(expanded(law.program), at | numbers, f"{tag}{j}_", dtype)
+            lines.lane += more
             gaps.append(f"({gap} - size)")
-        return f"({gaps[0]} > {tag}near + 1.000001 * (way + {tag}way)) & ({gaps[1]} > {tag}near)"
+        wide = literal(1.000001, dtype)
+        lines.results += [f"{gaps[0]} > {tag}near + {wide} * (way + {tag}way)", f"{gaps[1]} > {tag}near"]
+
+
+@dataclass
+class ClearLines:
+    """The statements of `clear`.
+
+    Attributes
+    ----------
+    once : of the table alone.
+    step : of the time t0 and the length h of a step.
+    lane : of a particle's path x0, y0, z0, u0, ..., w1, its radius, and h/3 by the name of `third`.
+    results : conditions that all hold if it is clear.
+    """
+
+    once: list[str]
+    step: list[str]
+    lane: list[str]
+    results: list[str] = field(default_factory=list)
+
+    @property
+    def result(self) -> str:
+        """Whether it is clear, as an expression."""
+        return " & ".join(f"({r})" for r in self.results) or "True"
 
 
 def _legs() -> list[str]:
     """Coordinates of the legs of the control polygon."""
-    return [leg for a in "xyz" for leg in (f"a{a} - {a}0", f"c{a} - a{a}", f"{a}1 - c{a}")]
+    return [
+        leg
+        for a, b in zip("xyz", "uvw", strict=True)
+        for leg in (f"third * {b}0", f"third * {b}1", f"({a}1 - {a}0) - third * ({b}0 + {b}1)")
+    ]
 
 
 def _constants(order: int, lagged: bool, dtype: str) -> list[str]:
@@ -209,10 +269,10 @@ def _shape(k: str, law: Traced) -> dict[str, str]:
     return {f"s{j}": f"P[{k}, SHAPE + {j}]" for j in range(_count(law))}
 
 
-def _numbers(before: list[str], tag: str, k: int, law: Traced) -> dict[str, str]:
+def _numbers(before: list[str], tag: str, k: int, law: Traced, table: str) -> dict[str, str]:
     """Names of locals for the numbers of a shape, read in `before`."""
     used = [j for j in range(_count(law)) if f"s{j}" in law.program.arguments()]
-    before += [f"{tag}s{j} = P[{k}, SHAPE + {j}]" for j in used]
+    before += [f"{tag}s{j} = R({table}[{k}, SHAPE + {j}])" for j in used]
     return {f"s{j}": f"{tag}s{j}" for j in used}
 
 

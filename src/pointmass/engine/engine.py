@@ -216,9 +216,9 @@ class Engine:
 
     def _made_groups(self, islands: Rows, newborn: NDArray[np.bool_] | None) -> list[Group]:
         size = np.bincount(islands)[islands]
-        alone = size == 1 if newborn is None else (size == 1) & ~newborn
-        alone &= control_of(self.solver) is None and not self.system.colliders
-        groups = [self._group(SinglesKernel, np.flatnonzero(alone), islands)] if alone.any() else []
+        alone = (size == 1) & (control_of(self.solver) is None)
+        births = newborn is not None
+        groups = [self._group(SinglesKernel, np.flatnonzero(alone), islands, births)] if alone.any() else []
         large = size >= LARGE
         for island in np.unique(islands[large]):
             groups.append(self._group(IslandKernel, np.flatnonzero(islands == island), islands, True))

@@ -62,15 +62,19 @@ class Deriv:
     ----------
     parallel : whether its loops are those of all threads.
     lagged : whether resting contact is that of the start of a piece (implicit solvers).
+    alone : whether it is for particles that are islands of their own, on which no element acts.
+    binder : that another kernel uses too.
     """
 
-    def __init__(self, system: ParticleSystem, parallel: bool, lagged: bool) -> None:
-        self.system = system
+    def __init__(
+        self, system: ParticleSystem, parallel: bool, lagged: bool, alone: bool = False, binder: Binder | None = None
+    ) -> None:
+        self.system, self.alone = system, alone
         self.contact: ContactText | None = None
         if system.colliders:
             self.contact = ContactText(surfaces_of(system), system.order, lagged, str(system.particles.dtype))
         self.order = system.order
-        self.binder = Binder(system.particles, Table("C"))
+        self.binder = binder or Binder(system.particles, Table("C"))
         self.families: list[Elements] = []
         self.loop = "prange" if parallel else "range"
         self.flags = "parallel=True, **FLAGS" if parallel else "**FLAGS"
@@ -96,7 +100,7 @@ class Deriv:
                 timed, lines = unary(self.binder, force, f"f{k}", UNARY, "g")
                 self._at_time += timed
                 sums += lines
-            elif isinstance(force, ElementForce):
+            elif isinstance(force, ElementForce) and not self.alone:
                 evaluate, gather = self._elements(force, f"f{k}")
                 elements += evaluate
                 sums += gather

@@ -1,7 +1,7 @@
 """Prints what the colliders do to an island before and after each piece of a step: the hooks of `ReferenceEngine`.
 
-`prepare` finds who stands on what, and `collide` lets everybody settle, bounce, strike and be put out again. What they do
-to one particle is printed by `contact`.
+`prepare` finds who stands on what, and `collide` lets everybody settle, bounce, strike and be put out again. What they
+do to one particle is printed by `contact`.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ class Impacts:
         ]
         arguments = "alone, t, h, x, v, events, paid, when, began, " + ", ".join(WORK)
         head = [f"@njit({self.flags})", f"def collide({self.call}, {arguments}):"]
-        doc = '    """Let everybody respond to what is in the way; the clock to go on from, and how many hits there were."""'
+        doc = '    """Let everybody respond to what is in the way; the clock to go on from, and how many hit."""'
         return "\n".join([*head, doc, *indented(lines, 1), "", "", ""])
 
     def _pay(self) -> list[str]:

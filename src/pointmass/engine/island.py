@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pointmass.engine import store
 from pointmass.engine.adaptive import control_text
+from pointmass.engine.binding import Binder
 from pointmass.engine.forces import Deriv, Incidence, incidence
 from pointmass.engine.impacts import WORK, Impacts
 from pointmass.engine.printing import indented
@@ -93,12 +94,20 @@ class IslandKernel:
     parallel : one large island by all threads, instead of many by one thread each.
     """
 
-    def __init__(self, system: ParticleSystem, solver: Solver, parallel: bool) -> None:
+    def __init__(
+        self,
+        system: ParticleSystem,
+        solver: Solver,
+        parallel: bool,
+        alone: bool = False,
+        binder: Binder | None = None,
+    ) -> None:
         self.system, self.solver = system, solver
         self.dtype = str(system.particles.dtype)
-        self.deriv = Deriv(system, parallel, solver.implicit)
+        self.deriv = Deriv(system, parallel, solver.implicit, alone, binder)
         self.impacts = self._impacts()
-        self.text = self._printed()
+        self.step = self._step_text()
+        self.text = self.functions_text + self._run()
 
     def _impacts(self) -> Impacts | None:
         deriv = self.deriv
@@ -107,22 +116,45 @@ class IslandKernel:
         row = [deriv.binder.attribute(name, "g") for name in ("w", "m", "radius")]
         return Impacts(deriv.contact, self.system.order, deriv.loop, deriv.flags, deriv.call, *row)
 
-    def _printed(self) -> str:
-        deriv, control = self.deriv, control_of(self.solver)
+    def _step_text(self) -> StepText:
         depends = self.system.velocity_dependent
-        step = step_text(self.solver, self.system.order, self.dtype, deriv.loop, depends, self.impacts is not None)
-        work = [*step.work, "x1", "v1"]
-        extra = []
-        if self.impacts is not None:
-            work += [*WORK, "av"]
-            extra = ["began", "events", "paid", "when"]
-        state = ", ".join([deriv.call, "clock, end, x, v", *work, *extra, "control, done"])
+        order, loop = self.system.order, self.deriv.loop
+        return step_text(self.solver, order, self.dtype, loop, depends, self.impacts is not None)
+
+    @property
+    def work(self) -> list[str]:
+        """Arrays that an island needs while it is advanced, each of length 3n."""
+        more = [] if self.impacts is None else [*WORK, "av"]
+        return [*self.step.work, "x1", "v1", *more]
+
+    @property
+    def call(self) -> str:
+        """The arguments of `advance`, as text."""
+        more = [] if self.impacts is None else ["events", "paid", "when"]
+        return ", ".join([self.deriv.call, "clock, end, x, v", *self.work, *more, "control, done"])
+
+    @property
+    def scratch(self) -> list[str]:
+        """Statements that make what an island needs; M has the largest counts of particles and of elements."""
+        contact = self.deriv.contact
+        lines = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{f.number + 1}], R)" for f in self.deriv.families]
+        lines += [f"{name} = np.empty(3 * M[0], R)" for name in self.work]
+        if contact is not None:
+            lines.append(f"K = np.zeros({contact.record} * M[0])")
+            lines += [f"{name} = np.zeros(M[0], np.int64)" for name in ("events", "paid")]
+            lines.append("when = np.zeros(1)")
+        return lines
+
+    @property
+    def functions_text(self) -> str:
+        """The functions down to `advance`."""
+        deriv, control = self.deriv, control_of(self.solver)
         parts = [REACHED, deriv.text, "\n\n", self._slope()]
         if self.impacts is not None:
             parts.append(self.impacts.text)
         if control is not None:
             parts.append(control_text(control, self.system.order, self.dtype, deriv.call))
-        return "".join([*parts, self._advance(step, state), self._run(work, state)])
+        return "".join([*parts, self._advance()])
 
     def _slope(self) -> str:
         """dy/dt, in two arrays: of x and of v (order 1: of x alone)."""
@@ -138,9 +170,9 @@ class IslandKernel:
         head = [f"@njit({deriv.flags})", f"def slope({deriv.call}, t, x, v, kx, kv):"]
         return "\n".join([*head, *indented(lines, 1), "", "", ""])
 
-    def _advance(self, step: StepText, state: str) -> str:
+    def _advance(self) -> str:
         """An island from its clock to the end of a step."""
-        deriv, second = self.deriv, self.system.order == 2
+        deriv, second, step = self.deriv, self.system.order == 2, self.step
         trial = [line.replace("SLOPE(", f"slope({deriv.call}, ") for line in step.lines]
         keep = ["x[q] = x1[q]"] + ["v[q] = v1[q] if C[0, base + q // 3] != 0 else R(0)"] * second
         wanted, judged = ["h = left", "last = True"], []
@@ -168,8 +200,9 @@ class IslandKernel:
                 f"for q in {deriv.loop}(3 * n):",
                 *indented([f"{q}0[q] = {q}[q]" for q in "xv"[: self.system.order]], 1),
             ]
+            arrays = ", ".join(WORK)
             beyond = [
-                f"now, hits = collide({deriv.call}, n == 1, clock, h, x, v, events, paid, when, began, {', '.join(WORK)})",
+                f"now, hits = collide({deriv.call}, n == 1, clock, h, x, v, events, paid, when, began, {arrays})",
                 "if hits > 0:",
                 *indented(self._anew(), 1),
                 "if now < clock + h:",
@@ -199,7 +232,7 @@ class IslandKernel:
             *indented(beyond, 1),
             "return status",
         ]
-        return "\n".join([f"@njit({deriv.flags})", f"def advance({state}):", *indented(lines, 1), "", "", ""])
+        return "\n".join([f"@njit({deriv.flags})", f"def advance({self.call}):", *indented(lines, 1), "", "", ""])
 
     def _begin(self) -> list[str]:
         """At the beginning of a step: nobody has hit anything, and everybody is where the step began."""
@@ -220,18 +253,12 @@ class IslandKernel:
             return ["pass"]
         return [f"control[{k}] = {value!r}" for k, value in enumerate((0.0, control.floor, 0.0))]
 
-    def _run(self, work: list[str], state: str) -> str:
+    def _run(self) -> str:
         """The kernel itself: the islands of a group over a span."""
         deriv = self.deriv
         ranges = [f"s{f.number} = S{f.number}[island]" for f in deriv.families]
         ranges += [f"e{f.number} = S{f.number}[island + 1]" for f in deriv.families]
-        scratch = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{f.number + 1}], R)" for f in deriv.families]
-        scratch += [f"{name} = np.empty(3 * M[0], R)" for name in work]
-        if deriv.contact is not None:
-            scratch.append(f"K = np.zeros({deriv.contact.record} * M[0])")
-            scratch += [f"{name} = np.zeros(M[0], np.int64)" for name in ("events", "paid")]
-            scratch += ["when = np.zeros(1)", "began = 0.0"]
-        call = state.replace(", x, v, ", ", xi, vi, ")
+        call = self.call.replace(", x, v, ", ", xi, vi, ")
         island = [
             "base = first[island]",
             "n = first[island + 1] - base",
@@ -253,7 +280,7 @@ class IslandKernel:
         ]
         data = ", ".join([*deriv.data, *(f"S{f.number}" for f in deriv.families)])
         grid = "birth, t0, dt, k0, count, controls, work, status, reach"
-        loop = [*scratch, "for island in range(lo, hi):", *indented(island, 1)]
+        loop = [*self.scratch, "for island in range(lo, hi):", *indented(island, 1)]
         head = ["@njit(**FLAGS)", f"def run(lo, hi, first, x, v, {data}, M, {grid}):"]
         return "\n".join([*head, *indented(loop, 1), ""])
 

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from pointmass.engine import store
 from pointmass.engine.binding import Binder, Table
+from pointmass.engine.contact import ClearLines
 from pointmass.engine.forces import unary
-from pointmass.engine.island import NOT_FINITE, Outcome, Span
+from pointmass.engine.island import NOT_FINITE, IslandKernel, Outcome, Span
 from pointmass.engine.printing import indented, literal
 from pointmass.engine.threads import spread
 from pointmass.laws.unary import UnaryForce
@@ -30,16 +31,18 @@ from pointmass.system import ParticleSystem
 Array = NDArray[np.floating[Any]]
 Rows = NDArray[np.intp]
 GRAIN = 4  # tiles that are worth a thread
+LANE = "i"  # index of a lane
+STATE = 7  # rows of the scratch before the columns: x, v, and who waits
 W = 256  # lanes of a tile
 AXES = "xyz"
 UNROLLED = (4, 1)  # steps that a lane makes in registers
-LONG = 60  # statements of a step that are not unrolled
+LONG = 90  # statements of a step that are not unrolled
 TRANSPOSED = f'''BITS = np.int32 if R is np.float32 else np.int64
 SIZE = BITS(np.iinfo(BITS).max)  # all bits but the sign
 
 
 @njit(**FLAGS)
-def reached(s, offset, m):
+def reached_by(s, offset, m):
     """Largest size of three runs of lanes. As whole numbers, the bits of a size are in the order of the sizes, and NaN
     is above all: so the loop is one of vectors."""
     bits = s.view(BITS)
@@ -94,7 +97,7 @@ class Lanes(Table):
     """Columns of the particles of a tile, behind their state."""
 
     def entry(self, column: int, index: str) -> str:
-        return f"s[{(6 + column) * W} + i]"
+        return super().entry(column, index) if index != LANE else f"s[{(STATE + column) * W} + {LANE}]"
 
 
 class Motion:
@@ -112,7 +115,7 @@ class Motion:
         self.binder = Binder(system.particles, Lanes("C"), switches=not all(f.enabled for f in system.forces))
         self.dtype = self.binder.dtype
         self.at_time: list[str] = []
-        self.lines: list[str] = [f"w = {self.binder.attribute('w', 'i')}"]
+        self.lines: list[str] = [f"w = {self.binder.attribute('w', LANE)}"]
         self.pins = bool(system.particles.pinned.any())
         if self.pins:
             self.lines.append("free = w != 0")
@@ -135,7 +138,7 @@ class Motion:
             self.timed = (
                 self.timed or "t" in force.traced.depends_on or not all(p.steady for p in force.parameters.values())
             )
-            timed, lines = unary(self.binder, force, f"f{j}_{k}", state, "i", f"s{k}")
+            timed, lines = unary(self.binder, force, f"f{j}_{k}", state, LANE, f"s{k}")
             self.at_time += timed
             self.lines += lines
         scale = " * w" if self.system.order == 2 else ""
@@ -189,55 +192,70 @@ class Motion:
 
 
 class SinglesKernel:
-    """Advances particles that nobody pulls on."""
+    """Advances particles that nobody pulls on.
 
-    def __init__(self, system: ParticleSystem, solver: Solver) -> None:
-        self.system, self.solver = system, solver
+    Who comes near a surface, or is not born yet, waits while the others make a step, and then makes it by the text of
+    an island.
+
+    Parameters
+    ----------
+    births : whether some may not be born yet.
+    """
+
+    def __init__(self, system: ParticleSystem, solver: Solver, births: bool) -> None:
+        self.system, self.solver, self.births = system, solver, births
         self.motion = Motion(system, solver)
+        self.island: IslandKernel | None = None
+        if births or system.colliders:
+            self.island = IslandKernel(system, solver, parallel=False, alone=True, binder=self.motion.binder)
+        self.state = [(q, a) for q in ("xv" if system.order == 2 else "x") for a in AXES]
         self.text = self._printed()
 
     def _printed(self) -> str:
-        motion, state = self.motion, self.state
-        columns = len(motion.binder.particle.getters)
-        long = len(motion.lines) > LONG or motion.timed
-        unrolled = [u for u in UNROLLED if u == 1 or not long]
-        moves = [f"{q}_{a} = {q}1_{a}" for q, a in state if q == "x"]
-        moves += [f"{q}_{a} = {motion._free(f'{q}1_{a}')}" for q, a in state if q == "v"]
-        parts = [self._lanes(u, [*motion.lines, *moves]) for u in unrolled]
-        load = [f"s[{(6 + c) * W} + i] = C[{c}, lo + i]" for c in range(columns)]
-        copies = [(f"{q}", 3 * W * k) for k, q in enumerate("xv" if self.system.order == 2 else "x")]
-        steps, shared = [], ", ".join(self.shared)
-        for u in unrolled:
-            times = ", ".join(f"t0 + (k + {j}) * dt" for j in range(u + 1))
-            steps += [f"while k + {u} <= k0 + count:", f"    bad |= lanes{u}({shared}, {times})", f"    k += {u}"]
-        run = [
-            "@njit(**FLAGS)",
-            f"def run(first, last, x, v, {', '.join(motion.binder.arrays)}, t0, dt, k0, count, status, reach):",
-            "    n = len(x) // 3",
-            f"    s = np.ones({(6 + columns) * W}, R)",
-            "    for tile in range(first, last):",
-            f"        lo = tile * {W}",
-            f"        m = min({W}, n - lo)",
-            *(f"        load(s, {offset}, {q}, lo, m)" for q, offset in copies),
-            "        for i in range(m):",
-            *indented(load, 3),
-            "        bad = 0",
-            "        k = k0",
-            *indented(steps, 2),
-            *(f"        reach[tile, {k}] = reached(s, {offset}, m)" for k, (_, offset) in enumerate(copies)),
-            "        far = max(reach[tile, 0], reach[tile, 1])",
-            f"        status[tile] = bad if far < np.inf else {NOT_FINITE}",
-            *(f"        keep(s, {offset}, {q}, lo, m)" for q, offset in copies),
-            "",
-        ]
-        return motion.binder.functions + "\n".join([TRANSPOSED, *(line for part in parts for line in part), *run])
+        motion, island = self.motion, self.island
+        clear = self._clear()
+        step = [*motion.lines]
+        if clear is not None:
+            moves = "(w != R(0)) & " if motion.pins else ""
+            third = f"third = hr * {literal(1 / 3, motion.dtype)}"
+            step += [third, *self._path(), *clear.lane, f"waits = waits | {moves}(not ({clear.result}))"]
+        step += [f"{q}_{a} = {q}1_{a}" for q, a in self.state if q == "x"]
+        step += [f"{q}_{a} = {motion._free(f'{q}1_{a}')}" for q, a in self.state if q == "v"]
+        timed = motion.timed or (clear is not None and bool(clear.step))
+        unrolled = [u for u in UNROLLED if u == 1 or not (timed or len(step) > LONG)]
+        lanes = [line for u in unrolled for line in self._lanes(u, step, clear)]
+        first = motion.binder.functions if island is None else island.functions_text
+        catch_up = [] if island is None else self._catch_up(island)
+        return "\n".join([first, "", TRANSPOSED, *lanes, *catch_up, *self._run(unrolled), ""])
 
-    def _lanes(self, unrolled: int, step: list[str]) -> list[str]:
+    def _clear(self) -> ClearLines | None:
+        contact = None if self.island is None else self.island.deriv.contact
+        return None if contact is None else contact.clear_lines(self.motion.dtype, "F")
+
+    def _path(self) -> list[str]:
+        """The path of a lane by the names of `ClearLines`."""
+        radius = self.motion.binder.attribute("radius", LANE)
+        lines = [f"radius = {radius}"]
+        for end, tail in enumerate(("", "1")):
+            for q, letters in (("x", "xyz"), ("v", "uvw")):
+                there = q == "x" or self.system.order == 2
+                lines += [
+                    f"{b}{end} = {f'{q}{tail}_{a}' if there else 'R(0)'}" for a, b in zip(AXES, letters, strict=True)
+                ]
+        return lines
+
+    def _lanes(self, unrolled: int, step: list[str], clear: ClearLines | None) -> list[str]:
         """The function that makes a few steps of all lanes, with the state in registers in between."""
         motion = self.motion
         place = {f"{q}_{a}": f"s[{k * W} + i]" for k, (q, a) in enumerate(self.state)}
         times = [f"t{j}" for j in range(unrolled + 1)]
-        steps = [line for j in range(unrolled) for line in (f"hr = h{j}", *step)]
+        waiting = f"s[{6 * W} + i]"
+        keep = [f"{entry} = {name}" for name, entry in place.items()]
+        before = []
+        if self.island is not None:
+            before = [f"waits = {waiting} != R(0)"]
+            keep = [f"{entry} = {entry} if waits else {name}" for name, entry in place.items()]
+            keep.append(f"{waiting} = R(1) if waits else R(0)")
         return [
             "@njit(**FLAGS)",
             f"def lanes{unrolled}({', '.join([*self.shared, *times])}):",
@@ -247,25 +265,112 @@ class SinglesKernel:
             "    h = t1 - t0",
             "    status = 0",
             *indented(motion.at_time, 1),
+            *indented([] if clear is None else [*clear.once, *clear.step], 1),
             f"    for j in range({W}):",
-            "        i = np.uintp(j)",
-            *indented([f"{name} = {entry}" for name, entry in place.items()], 2),
-            *indented(steps, 2),
-            *indented([f"{entry} = {name}" for name, entry in place.items()], 2),
+            f"        {LANE} = np.uintp(j)",
+            *indented([*before, *(f"{name} = {entry}" for name, entry in place.items())], 2),
+            *indented([line for j in range(unrolled) for line in (f"hr = h{j}", *step)], 2),
+            *indented(keep, 2),
             "    return status",
             "",
+            "",
+        ]
+
+    def _catch_up(self, island: IslandKernel) -> list[str]:
+        """The function that takes those who waited over the steps that the others have made."""
+        call = island.call.replace("base, n,", "lo + i, 1,").replace(", x, v, ", ", xi, vi, ")
+        arguments = call.replace("lo + i, 1,", "").replace("clock, end, ", "")
+        waiting = f"s[{6 * W} + i]"
+        state = [
+            (f"{q}i[{k}]", f"s[{(3 * ('xv'.index(q)) + k) * W} + i]")
+            for q in "xv"[: self.system.order]
+            for k in range(3)
+        ]
+        begin = ["clock = max(clock, birth[lo + i])"] if self.births else []
+        return [
+            "@njit(**FLAGS)",
+            f"def catch_up(s, lo, m, t0, dt, k, steps, birth, {arguments}):",
+            "    bits = s.view(BITS)",
+            "    somebody = BITS(0)",
+            f"    for j in range({W}):",
+            f"        somebody |= bits[np.uintp({6 * W}) + np.uintp(j)]",
+            "    if somebody == 0:",
+            "        return 0",
+            "    status = 0",
+            f"    for i in range({W}):",
+            f"        if {waiting} != 0 and i < m:",
+            *indented([f"{local} = {entry}" for local, entry in state], 3),
+            "            for j in range(k, k + steps):",
+            "                clock = t0 + j * dt",
+            "                end = t0 + (j + 1) * dt",
+            *indented(begin, 4),
+            "                if clock < end and status == 0:",
+            f"                    status = advance({call})",
+            *indented([f"{entry} = {local}" for local, entry in state], 3),
+            f"        {waiting} = R(0)",
+            "    return status",
+            "",
+            "",
+        ]
+
+    def _run(self, unrolled: list[int]) -> list[str]:
+        """The kernel itself: tiles of particles over a span."""
+        motion, island, order = self.motion, self.island, self.system.order
+        columns = len(motion.binder.particle.getters)
+        copies = [(q, 3 * W * k) for k, q in enumerate("xv"[:order])]
+        shared = ", ".join(self.shared)
+        prepared, began, hold, caught = [], [], [], ""
+        if island is not None:
+            own = [
+                "xi = np.zeros(3, R)",
+                "vi = np.zeros(3, R)",
+                "control = np.zeros(3)",
+                "done = np.zeros(3, np.int64)",
+            ]
+            prepared = ["M = np.ones(1, np.int64)", *island.scratch, *own]
+            began = [f"s[{6 * W}:{7 * W}] = R(0)"]
+            arguments = (
+                island.call.replace("base, n, ", "").replace("clock, end, ", "").replace(", x, v, ", ", xi, vi, ")
+            )
+            arguments = arguments.removeprefix("clock, end, ")
+            caught = f"bad |= catch_up(s, lo, m, t0, dt, k, STEPS, birth, {arguments})"
+        if self.births:
+            began += ["late = -np.inf", "for i in range(m):", "    late = max(late, birth[lo + i])"]
+            hold = ["if late > t0 + k * dt:", "    for i in range(m):"]
+            hold += [f"        s[{6 * W} + i] = R(1) if birth[lo + i] > t0 + k * dt else R(0)"]
+        steps = []
+        for u in unrolled:
+            times = ", ".join(f"t0 + (k + {j}) * dt" for j in range(u + 1))
+            one = [*hold, f"bad |= lanes{u}({shared}, {times})"] + [caught.replace("STEPS", f"{u}")] * bool(caught)
+            steps += [f"while k + {u} <= k0 + count:", *indented([*one, f"k += {u}"], 1)]
+        arrays = [*motion.binder.arrays, *(["F"] if self.system.colliders else [])]
+        return [
+            "@njit(**FLAGS)",
+            f"def run(first, last, x, v, {', '.join(arrays)}, birth, t0, dt, k0, count, status, reach):",
+            "    n = len(x) // 3",
+            f"    s = np.ones({(STATE + columns) * W}, R)",
+            *indented(prepared, 1),
+            "    for tile in range(first, last):",
+            f"        lo = tile * {W}",
+            f"        m = min({W}, n - lo)",
+            *(f"        load(s, {offset}, {q}, lo, m)" for q, offset in copies),
+            *(f"        s[{(STATE + c) * W}:{(STATE + c) * W} + m] = C[{c}, lo:lo + m]" for c in range(columns)),
+            *indented(began, 2),
+            "        bad = 0",
+            "        k = k0",
+            *indented(steps, 2),
+            *(f"        reach[tile, {k}] = reached_by(s, {offset}, m)" for k, (_, offset) in enumerate(copies)),
+            "        far = max(reach[tile, 0], reach[tile, 1])",
+            f"        status[tile] = bad if far < np.inf else {NOT_FINITE}",
+            *(f"        keep(s, {offset}, {q}, lo, m)" for q, offset in copies),
             "",
         ]
 
     @property
     def shared(self) -> list[str]:
         """Arrays that the lanes read: the scratch holds the columns."""
-        return ["s", *(name for name in self.motion.binder.arrays if name != "C")]
-
-    @property
-    def state(self) -> list[tuple[str, str]]:
-        """(quantity, axis) of each component of the state."""
-        return [(q, a) for q in ("xv" if self.system.order == 2 else "x") for a in AXES]
+        more = ["F"] if self.system.colliders else []
+        return ["s", *(name for name in self.motion.binder.arrays if name != "C"), *more]
 
     @property
     def title(self) -> str:
@@ -297,10 +402,13 @@ class SingleMembers:
 
     def run(self, x: Array, v: Array, births: Array | None, span: Span, memory: Memory) -> Outcome:
         """Advance positions and velocities, shape (3 * rows,), in place."""
-        motion, count = self.kernel.motion, len(self.rows)
+        motion, island, count = self.kernel.motion, self.kernel.island, len(self.rows)
         particles = self.kernel.system.particles
         order = None if count == len(particles) else self.rows
         data = motion.binder.data(count, order)
+        if island is not None and island.deriv.contact is not None:
+            data.append(island.deriv.contact.table())
+        data.append(np.zeros(0) if births is None else births)
         tiles = -(-count // W)
         status, reach = np.zeros(tiles, np.int64), np.zeros((tiles, 2), x.dtype)
         grid = (span.t0, span.dt, span.first, span.count)
