@@ -476,7 +476,7 @@ def root(P, k, a, b, g_low, g_high, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, 
         else:
             s = 0.5 * (a + b)
             last = 0.5 * (b - a)
-        if not (b - a > RESOLUTION and a < s and s < b):
+        if not (b - a > RESOLUTION and a < s < b):
             break
     return a
 
