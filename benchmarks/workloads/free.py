@@ -72,7 +72,7 @@ def races(quick: bool) -> list[Race]:
 
 def _race(title: str, case: str, make: Any, contestants: Any, n: int, slots: float) -> Race:
     substeps = Problem.substeps
-    return Race(title, case, make, contestants, judge, "particle-steps", n * substeps, slots, 48 / substeps)
+    return Race(title, case, make, contestants, judge, "particle-steps", float(n * substeps), n, slots, 48 / substeps)
 
 
 # ---------------------------------------------------------------------------------------------------- the reference
@@ -172,7 +172,7 @@ class Pointmass(Contestant):
     def frame(self) -> None:
         self.sim.step(self.substeps)
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.sim.system.particles.x
 
 
@@ -196,7 +196,7 @@ class NumPy(Contestant):
         for _ in range(self.problem.substeps):
             self.x, self.v = numpy_step(self.problem, self.x, self.v)
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.x
 
 
@@ -249,7 +249,7 @@ class C(Contestant):
         state = self.state.ctypes.data_as(ctypes.c_void_p)
         self.function(state, ctypes.c_long(p.n), p.substeps, self.fused, int(p.rk4), self.numbers)
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.state[:3].T
 
 
@@ -289,7 +289,7 @@ class Taichi(Contestant):
         g, center, rk4 = ti.Vector([0.0, p.g, 0.0]), ti.Vector(p.center), p.rk4
 
         @ti.func
-        def slope(xi, vi):  # type: ignore[no-untyped-def]
+        def slope(xi, vi):
             a = g - k * vi
             if ti.static(mu != 0):
                 d = xi - center
@@ -298,7 +298,7 @@ class Taichi(Contestant):
             return a
 
         @ti.kernel
-        def advance():  # type: ignore[no-untyped-def]
+        def advance():
             for i in x:
                 xi, vi = x[i], v[i]
                 for _ in range(inner):
@@ -327,7 +327,7 @@ class Taichi(Contestant):
             self.kernel()
         self.ti.sync()
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.x.to_numpy()
 
 
@@ -357,18 +357,18 @@ class Warp(Contestant):
         restitution, eps, mu, center, soft2 = p.restitution, p.eps, p.mu, wp.vec3(*p.center), p.soft**2
 
         @wp.func
-        def slope(x: wp.vec3, v: wp.vec3):  # type: ignore[no-untyped-def]
+        def slope(x: wp.vec3, v: wp.vec3):
             d = x - center
             r2 = wp.dot(d, d) + soft2
             return g - k * v - mu / (r2 * wp.sqrt(r2)) * d
 
         @wp.func
-        def euler(x: wp.vec3, v: wp.vec3):  # type: ignore[no-untyped-def]
+        def euler(x: wp.vec3, v: wp.vec3):
             u = v + h * (g - k * v)
             return x + h * u, u
 
         @wp.func
-        def rk4(x: wp.vec3, v: wp.vec3):  # type: ignore[no-untyped-def]
+        def rk4(x: wp.vec3, v: wp.vec3):
             a = slope(x, v)
             v2 = v + 0.5 * h * a
             b = slope(x + 0.5 * h * v, v2)
@@ -381,7 +381,7 @@ class Warp(Contestant):
         step = rk4 if p.rk4 else euler
 
         @wp.kernel(enable_backward=False)
-        def advance(xs: wp.array(dtype=wp.vec3), vs: wp.array(dtype=wp.vec3), inner: int):  # type: ignore
+        def advance(xs: wp.array(dtype=wp.vec3), vs: wp.array(dtype=wp.vec3), inner: int):
             i = wp.tid()
             x = xs[i]
             v = vs[i]
@@ -400,7 +400,7 @@ class Warp(Contestant):
         for _ in range(1 if self.fused else self.problem.substeps):
             self.launch.launch()
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.x.numpy()
 
 
@@ -457,7 +457,7 @@ class JAX(Contestant):
         self.x, self.v = self.run(self.x, self.v)
         self.x.block_until_ready()
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return np.asarray(self.x)
 
 

@@ -117,7 +117,7 @@ class Pointmass(Contestant):
     def frame(self) -> None:
         self.sim.step(self.substeps)
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.sim.system.particles.x
 
 
@@ -135,7 +135,7 @@ class NumPy(Contestant):
         for _ in range(self.problem.substeps):
             self.x, self.v = numpy_step(self.problem, self.x, self.v, self.pairs, self.rest, self.w)
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.x
 
 
@@ -158,7 +158,7 @@ class C(Contestant):
     def frame(self) -> None:
         self.function(*self.arguments)
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.now[:, :3]
 
 
@@ -189,7 +189,7 @@ class TaichiScatter(Contestant):
         h, k_s, k_d, g = p.dt, p.k_s, p.k_d, ti.Vector([0.0, p.g, 0.0])
 
         @ti.kernel
-        def advance():  # type: ignore[no-untyped-def]
+        def advance():
             for i in f:
                 f[i] = ti.Vector([0.0, 0.0, 0.0])
             for e in ends:
@@ -211,7 +211,7 @@ class TaichiScatter(Contestant):
             self.kernel()
         self.ti.sync()
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.x.to_numpy().reshape(-1, 3)
 
 
@@ -230,7 +230,7 @@ class TaichiGather(TaichiScatter):
         h, k_s, k_d, g = p.dt, p.k_s, p.k_d, ti.Vector([0.0, p.g, 0.0])
 
         @ti.kernel
-        def advance():  # type: ignore[no-untyped-def]
+        def advance():
             for i in x:
                 xi, vi = x[i], v[i]
                 f = ti.Vector([0.0, 0.0, 0.0])
@@ -267,7 +267,7 @@ class TaichiLattice(TaichiScatter):
         h, k_s, k_d, g = p.dt, p.k_s, p.k_d, ti.Vector([0.0, p.g, 0.0])
 
         @ti.kernel
-        def advance():  # type: ignore[no-untyped-def]
+        def advance():
             for i, j in x:
                 xi, vi = x[i, j], v[i, j]
                 f = ti.Vector([0.0, 0.0, 0.0])
@@ -304,12 +304,12 @@ class WarpScatter(Contestant):
 
         @wp.kernel
         def pull(
-            x: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            v: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            f: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            ends: wp.array(dtype=wp.vec2i),  # type: ignore[valid-type]
-            rest: wp.array(dtype=float),  # type: ignore[valid-type]
-        ):  # type: ignore[no-untyped-def]
+            x: wp.array(dtype=wp.vec3),
+            v: wp.array(dtype=wp.vec3),
+            f: wp.array(dtype=wp.vec3),
+            ends: wp.array(dtype=wp.vec2i),
+            rest: wp.array(dtype=float),
+        ):
             e = wp.tid()
             a = ends[e][0]
             b = ends[e][1]
@@ -322,11 +322,11 @@ class WarpScatter(Contestant):
 
         @wp.kernel
         def move(
-            x: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            v: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            f: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            w: wp.array(dtype=float),  # type: ignore[valid-type]
-        ):  # type: ignore[no-untyped-def]
+            x: wp.array(dtype=wp.vec3),
+            v: wp.array(dtype=wp.vec3),
+            f: wp.array(dtype=wp.vec3),
+            w: wp.array(dtype=float),
+        ):
             i = wp.tid()
             if w[i] > 0.0:
                 v[i] = v[i] + h * (w[i] * f[i] + g)
@@ -343,7 +343,7 @@ class WarpScatter(Contestant):
             for launch in self.launches:
                 launch.launch()
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.x.numpy()
 
 
@@ -366,15 +366,15 @@ class WarpGather(Contestant):
 
         @wp.kernel
         def advance(
-            x: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            v: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            y: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            u: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            start: wp.array(dtype=int),  # type: ignore[valid-type]
-            near: wp.array(dtype=int),  # type: ignore[valid-type]
-            rest: wp.array(dtype=float),  # type: ignore[valid-type]
-            w: wp.array(dtype=float),  # type: ignore[valid-type]
-        ):  # type: ignore[no-untyped-def]
+            x: wp.array(dtype=wp.vec3),
+            v: wp.array(dtype=wp.vec3),
+            y: wp.array(dtype=wp.vec3),
+            u: wp.array(dtype=wp.vec3),
+            start: wp.array(dtype=int),
+            near: wp.array(dtype=int),
+            rest: wp.array(dtype=float),
+            w: wp.array(dtype=float),
+        ):
             i = wp.tid()
             f = wp.vec3()
             for e in range(start[i], start[i + 1]):
@@ -396,7 +396,7 @@ class WarpGather(Contestant):
             for launch in self.launches:
                 launch.launch()
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.x.numpy()
 
 
@@ -430,5 +430,5 @@ class JAX(Contestant):
         self.x, self.v = self.run(self.x, self.v)
         self.x.block_until_ready()
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return np.asarray(self.x)
