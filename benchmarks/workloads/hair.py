@@ -33,12 +33,13 @@ def races(quick: bool) -> list[Race]:
 
 
 def hair(strands: int) -> Springs:
-    """Strands that stick out sideways, held at their roots."""
+    """Strands that stick out of a wall, held at their roots; near the origin, so that float32 can tell places apart."""
     dt, mass = 1 / 60 / SUBSTEPS, 1e-3
     at = np.arange(strands * MASSES).reshape(strands, MASSES)
     x = np.zeros((strands, MASSES, 3))
     x[..., 0] = LINK * np.arange(MASSES)
-    x[..., 2] = LINK * np.arange(strands)[:, None]
+    row, column = np.divmod(np.arange(strands), max(1, round(strands**0.5)))
+    x[..., 1], x[..., 2] = LINK * row[:, None], LINK * column[:, None]
     x += np.random.default_rng(0).normal(0.0, 0.01 * LINK, x.shape)
     families = [np.stack([at[:, :-k].ravel(), at[:, k:].ravel()], axis=1).astype(np.int32) for k in (1, 2)]
     return Springs(

@@ -247,10 +247,13 @@ class JAX(Contestant):
         m = jnp.array(p.m)
 
         def step(x: Any, v: Any) -> Any:
+            columns = x.T
+
             def pulled(at: Any) -> Any:
-                d = x - at
-                inverse = jax.lax.rsqrt((d * d).sum(axis=1) + p.eps**2)
-                return (m * inverse * inverse * inverse) @ d
+                d = [column - place for column, place in zip(columns, at, strict=True)]
+                inverse = jax.lax.rsqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + p.eps**2)
+                pull = m * inverse * inverse * inverse
+                return jnp.stack([(pull * q).sum() for q in d])
 
             v = v + p.dt * jax.lax.map(pulled, x, batch_size=BLOCK)
             return x + p.dt * v, v
