@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 PATIENCE = 300.0  # a contestant that says nothing for so long is out [s]
 GOAL = 0.06  # a turn lasts about so long [s], so that the clock and the wake-up of threads do not matter
 MOST_FRAMES = 32  # of a turn
-BUDGET = 5.0  # of one contestant in one race [s]; the slow ones get fewer turns
+BUDGET = 4.0  # of one contestant in one race [s]; the slow ones get fewer turns
 PAUSE = 0.02  # between turns [s]: threads that spin while they wait go to sleep
 POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -53,9 +53,13 @@ class Contestant:
         """Advance one frame; returns the time it took [s] if it has a better clock than the caller."""
         raise NotImplementedError
 
-    def positions(self) -> Array:
-        """Where the particles are now, shape (n, 3)."""
+    def result(self) -> Array:
+        """What the judge looks at, shape (n, 3): where the particles are now, unless the workload says otherwise."""
         raise NotImplementedError
+
+    def note(self) -> str:
+        """What else there is to say at the end of the race."""
+        return ""
 
 
 @dataclass(frozen=True)
@@ -87,6 +91,7 @@ class Race:
     judge : (problem, scheme) -> Judge, from the float64 reference.
     unit : what is counted, such as "particle-steps".
     work : units in a frame.
+    particles : how many there are.
     slots : operations on a multiply-add unit that one unit of work needs at least.
     traffic : bytes between memory and processor that one unit of work needs at least.
     double : whether the roofline is that of float64.
@@ -99,6 +104,7 @@ class Race:
     judge: Callable[[Any, str], Judge]
     unit: str
     work: float
+    particles: int
     slots: float
     traffic: float = 0.0
     double: bool = False
@@ -121,6 +127,7 @@ class Result:
     memory: float = 0.0
     error: float = np.nan
     out: str = ""
+    note: str = ""
 
     @property
     def best(self) -> float:
@@ -186,7 +193,10 @@ def _take_turns(started: list[tuple[_Worker, Result]], turns: int, say: Callable
             started.remove((worker, result))
             continue
         frames = max(1, min(MOST_FRAMES, round(GOAL / seconds)))
-        left[worker] = (frames, max(2, min(turns, round(BUDGET / (frames * seconds)))) if turns > 1 else 1)
+        left[worker] = (frames, min(turns, round(BUDGET / (frames * seconds))))
+        if left[worker][1] < 2:  # one that takes so long is timed once
+            left[worker] = (frames, 0)
+            result.seconds.append(seconds)
     for turn in range(turns):
         for worker, result in list(started):
             frames, its_turns = left[worker]
@@ -198,7 +208,8 @@ def _take_turns(started: list[tuple[_Worker, Result]], turns: int, say: Callable
                 started.remove((worker, result))
             else:
                 result.seconds.append(seconds)
-    for worker, _ in started:
+    for worker, result in started:
+        result.note = worker.note()
         worker.stop()
 
 
@@ -250,6 +261,14 @@ class _Worker:
         (seconds,) = self.answer()
         return float(seconds)
 
+    def note(self) -> str:
+        """What the contestant has to say at the end."""
+        self._pipe.send(0)
+        try:
+            return str(self.answer()[0])
+        except _Out as reason:
+            return str(reason)
+
     def stop(self) -> None:
         """End the process."""
         self._pipe.close()
@@ -272,10 +291,9 @@ def _serve(pipe: Connection, kind: type[Contestant], make: Callable[[], Any], ro
         contestant.frame()
         first = time.perf_counter() - start
         grown = _memory("VmHWM") - before
-        positions = np.asarray(contestant.positions(), np.float64)
+        positions = np.asarray(contestant.result(), np.float64)
         pipe.send(("ready", first, grown, positions if rows is None else positions[rows]))
-        while True:
-            frames = pipe.recv()
+        while frames := pipe.recv():
             own: float | None = 0.0
             start = time.perf_counter()
             for _ in range(frames):
@@ -283,6 +301,7 @@ def _serve(pipe: Connection, kind: type[Contestant], make: Callable[[], Any], ro
                 own = None if seconds is None or own is None else own + seconds
             took = time.perf_counter() - start
             pipe.send(("took", (took if own is None else own) / frames))
+        pipe.send(("note", contestant.note()))
     except EOFError:
         return
     except ModuleNotFoundError as error:
@@ -296,7 +315,7 @@ def _serve(pipe: Connection, kind: type[Contestant], make: Callable[[], Any], ro
 
 
 def _memory(what: str) -> float:
-    """Memory of this process [bytes]: "VmRSS" now, "VmHWM" the most since "VmRSS" was last asked for; nan if unknown."""
+    """Memory of this process [bytes]: "VmRSS" now, "VmHWM" the most since then; nan where nobody tells."""
     try:
         if what == "VmRSS":
             Path("/proc/self/clear_refs").write_text("5", encoding="ascii")

@@ -48,7 +48,7 @@ def _race(title: str, case: str, make: Any, contestants: Any) -> Race:
     p = make()
     work = float(p.substeps * len(p.pairs))
     traffic = 48 * len(p.x) / work  # the state once a frame
-    return Race(title, case, make, contestants, springs.judge, "spring-steps", work, springs.SLOTS, traffic)
+    return Race(title, case, make, contestants, springs.judge, "spring-steps", work, len(p.x), springs.SLOTS, traffic)
 
 
 def cloth(side: int) -> Springs:

@@ -1,9 +1,38 @@
-"""How the peers are set up: every one in its best mode."""
+"""How contestants are set up: every peer in its best mode, and pointmass as a user writes it."""
 
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from benchmarks.track import Array, Contestant
+
+if TYPE_CHECKING:
+    import pointmass as pm
+
+
+class Ours(Contestant):
+    """pointmass by its public API.
+
+    Attributes
+    ----------
+    sim : to be made by the constructor.
+    steps : of a frame.
+    """
+
+    name = "pointmass"
+    sim: pm.Simulation
+    steps: int
+
+    def frame(self) -> None:
+        self.sim.step(self.steps)
+
+    def result(self) -> Array:
+        return self.sim.system.particles.x
+
+    def note(self) -> str:
+        missing = self.sim.engine.missing()
+        return f"not compiled, because there is no kernel for {', '.join(missing)}" if missing else ""
 
 
 def start_taichi(ti: Any) -> None:

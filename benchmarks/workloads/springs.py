@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from benchmarks.toolchain import compiled
 from benchmarks.track import Array, Contestant, Judge, against
-from benchmarks.workloads.peers import start_taichi, start_warp
+from benchmarks.workloads.peers import Ours, start_taichi, start_warp
 
 TOLERANCE = 1e-3  # of the shortest spring
 # 3 differences of x and of v, length 3, root 4, along 3, the law 3, 3 products and 6 sums; on a multiply-add unit these
@@ -99,10 +99,8 @@ def numpy_step(p: Springs, x: Array, v: Array, pairs: Any, rest: Array, w: Array
     return x + real(p.dt) * v, v
 
 
-class Pointmass(Contestant):
+class Pointmass(Ours):
     """The public API, as a user writes it."""
-
-    name = "pointmass"
 
     def __init__(self, p: Springs) -> None:
         import pointmass as pm
@@ -112,13 +110,7 @@ class Pointmass(Contestant):
         forces: list[Any] = [pm.Gravity((0, p.g, 0))]
         forces += [pm.Springs(a, p.k_s, p.k_d, r) for a, r in zip(p.families, p.rest, strict=True)]
         self.sim = pm.Simulation(pm.ParticleSystem(particles, forces), "symplectic_euler", p.dt)
-        self.substeps = p.substeps
-
-    def frame(self) -> None:
-        self.sim.step(self.substeps)
-
-    def positions(self) -> Array:
-        return self.sim.system.particles.x
+        self.steps = p.substeps
 
 
 class NumPy(Contestant):
@@ -135,7 +127,7 @@ class NumPy(Contestant):
         for _ in range(self.problem.substeps):
             self.x, self.v = numpy_step(self.problem, self.x, self.v, self.pairs, self.rest, self.w)
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.x
 
 
@@ -158,7 +150,7 @@ class C(Contestant):
     def frame(self) -> None:
         self.function(*self.arguments)
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.now[:, :3]
 
 
@@ -189,7 +181,7 @@ class TaichiScatter(Contestant):
         h, k_s, k_d, g = p.dt, p.k_s, p.k_d, ti.Vector([0.0, p.g, 0.0])
 
         @ti.kernel
-        def advance():  # type: ignore[no-untyped-def]
+        def advance():
             for i in f:
                 f[i] = ti.Vector([0.0, 0.0, 0.0])
             for e in ends:
@@ -211,7 +203,7 @@ class TaichiScatter(Contestant):
             self.kernel()
         self.ti.sync()
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.x.to_numpy().reshape(-1, 3)
 
 
@@ -230,7 +222,7 @@ class TaichiGather(TaichiScatter):
         h, k_s, k_d, g = p.dt, p.k_s, p.k_d, ti.Vector([0.0, p.g, 0.0])
 
         @ti.kernel
-        def advance():  # type: ignore[no-untyped-def]
+        def advance():
             for i in x:
                 xi, vi = x[i], v[i]
                 f = ti.Vector([0.0, 0.0, 0.0])
@@ -267,7 +259,7 @@ class TaichiLattice(TaichiScatter):
         h, k_s, k_d, g = p.dt, p.k_s, p.k_d, ti.Vector([0.0, p.g, 0.0])
 
         @ti.kernel
-        def advance():  # type: ignore[no-untyped-def]
+        def advance():
             for i, j in x:
                 xi, vi = x[i, j], v[i, j]
                 f = ti.Vector([0.0, 0.0, 0.0])
@@ -304,12 +296,12 @@ class WarpScatter(Contestant):
 
         @wp.kernel
         def pull(
-            x: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            v: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            f: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            ends: wp.array(dtype=wp.vec2i),  # type: ignore[valid-type]
-            rest: wp.array(dtype=float),  # type: ignore[valid-type]
-        ):  # type: ignore[no-untyped-def]
+            x: wp.array(dtype=wp.vec3),
+            v: wp.array(dtype=wp.vec3),
+            f: wp.array(dtype=wp.vec3),
+            ends: wp.array(dtype=wp.vec2i),
+            rest: wp.array(dtype=float),
+        ):
             e = wp.tid()
             a = ends[e][0]
             b = ends[e][1]
@@ -322,11 +314,11 @@ class WarpScatter(Contestant):
 
         @wp.kernel
         def move(
-            x: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            v: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            f: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            w: wp.array(dtype=float),  # type: ignore[valid-type]
-        ):  # type: ignore[no-untyped-def]
+            x: wp.array(dtype=wp.vec3),
+            v: wp.array(dtype=wp.vec3),
+            f: wp.array(dtype=wp.vec3),
+            w: wp.array(dtype=float),
+        ):
             i = wp.tid()
             if w[i] > 0.0:
                 v[i] = v[i] + h * (w[i] * f[i] + g)
@@ -343,7 +335,7 @@ class WarpScatter(Contestant):
             for launch in self.launches:
                 launch.launch()
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.x.numpy()
 
 
@@ -366,15 +358,15 @@ class WarpGather(Contestant):
 
         @wp.kernel
         def advance(
-            x: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            v: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            y: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            u: wp.array(dtype=wp.vec3),  # type: ignore[valid-type]
-            start: wp.array(dtype=int),  # type: ignore[valid-type]
-            near: wp.array(dtype=int),  # type: ignore[valid-type]
-            rest: wp.array(dtype=float),  # type: ignore[valid-type]
-            w: wp.array(dtype=float),  # type: ignore[valid-type]
-        ):  # type: ignore[no-untyped-def]
+            x: wp.array(dtype=wp.vec3),
+            v: wp.array(dtype=wp.vec3),
+            y: wp.array(dtype=wp.vec3),
+            u: wp.array(dtype=wp.vec3),
+            start: wp.array(dtype=int),
+            near: wp.array(dtype=int),
+            rest: wp.array(dtype=float),
+            w: wp.array(dtype=float),
+        ):
             i = wp.tid()
             f = wp.vec3()
             for e in range(start[i], start[i + 1]):
@@ -396,7 +388,7 @@ class WarpGather(Contestant):
             for launch in self.launches:
                 launch.launch()
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return self.x.numpy()
 
 
@@ -430,5 +422,5 @@ class JAX(Contestant):
         self.x, self.v = self.run(self.x, self.v)
         self.x.block_until_ready()
 
-    def positions(self) -> Array:
+    def result(self) -> Array:
         return np.asarray(self.x)
