@@ -137,7 +137,11 @@ class Pairs:
         j, law, loop = self.number, self._law, self.loop
         force, particles = self.force, self.binder.particles
         reach = self.binder.numbers.number(f"reach {id(force)}", lambda: _reach(force, particles))
-        sides = [self.binder.numbers.number(f"side {id(force)} {a}", _side(force, a)) for a in range(3)] if force.box is not None else []
+        sides = (
+            [self.binder.numbers.number(f"side {id(force)} {a}", _side(force, a)) for a in range(3)]
+            if force.box is not None
+            else []
+        )
         lanes = 16 if self.binder.dtype == "float32" else 8
         inputs = {q: f"z[{k * PIECE} + q]" for k, q in enumerate(law.second)}
         sums = [len(law.second) * PIECE + k * (PIECE + lanes) for k in range(law.sums)]
@@ -249,7 +253,8 @@ class Pairs:
                     f"    u = np.float64(x[3 * (H[s + i] - base) + {a}])",
                     f"    low{a} = min(low{a}, u)",
                     "    high = max(high, u)",
-                    f"n{a} = np.int64(max({2 * FINE[a] + 1}.0, min((high - low{a}) / (far / {FINE[a]}), 1048575.0) + 1.0))",
+                    f"most = min(max((high - low{a}) / (far / {FINE[a]}) + 1.0, {2 * FINE[a] + 1}.0), 1048576.0)",
+                    f"n{a} = np.int64(most)",
                 ]
         place = []
         for a in range(3):
