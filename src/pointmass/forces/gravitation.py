@@ -30,7 +30,7 @@ class Gravitation(PairForce):
     def law(x1: Any, v1: Any, m1: Any, x2: Any, v2: Any, m2: Any, t: Any, eps: Any) -> Any:
         """What particle 2 adds to the field at particle 1, without -G."""
         d = fn.sub(x1, x2)
-        inverse = 1.0 / fn.sqrt(fn.dot(d, d) + eps * eps)
+        inverse = 1.0 / fn.sqrt(eps * eps + d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
         return fn.scale(m2 * (inverse * inverse * inverse), d)
 
     @staticmethod
