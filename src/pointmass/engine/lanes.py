@@ -1,0 +1,442 @@
+"""The fast path of many islands of one topology: hair, snakes, fish, ensembles.
+
+Lane = island. A tile of islands is loaded once into a scratch, [component][node][lane], makes all steps of a span there,
+and is stored once. The loop over the elements is outside and the loop over the islands inside, so nothing is gathered:
+the operations of the island text in the same order, and the same bits. Tiles are always padded to full width.
+
+Few elements are printed one by one, with all offsets constant. Many are a loop, which brings the nodes of an element to
+a fixed place, where the law finds them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.engine import store
+from pointmass.engine.binding import Binder, Table
+from pointmass.engine.forces import incidence, unary
+from pointmass.engine.island import NOT_FINITE, Rows, Span
+from pointmass.engine.phases import STATE, entries, phases, regions, simple
+from pointmass.engine.printing import indented
+from pointmass.laws.elements import ElementForce
+from pointmass.laws.unary import UnaryForce
+from pointmass.solvers.base import Solver
+from pointmass.system import ParticleSystem
+from pointmass.tracing.trace import vector_names
+
+AXES = "xyz"
+FEWEST = 8  # islands that are worth a tile
+UNROLLED = 1500  # statements of elements that are printed one by one
+WIDTHS = (64, 32, 16)  # lanes of a tile
+ROOM = 28_000  # bytes of a scratch that fits into the first cache
+
+
+def _inputs(quantity: str, node: int | None = None) -> tuple[str, str, str]:
+    """The inputs of a law for a part of the state: x_x, ... or x1_x, ..."""
+    return vector_names(f"{quantity.lower()}{node or ''}")
+
+
+@dataclass
+class Scratch:
+    """Where the rows of a scratch are; a row has a number for each lane."""
+
+    rows: int = 0
+    places: dict[str, int] = field(default_factory=dict)
+
+    def block(self, name: str, rows: int) -> int:
+        """The first row of a block; a block with a new name is added."""
+        if name not in self.places:
+            self.places[name] = self.rows
+            self.rows += rows | 1
+        return self.places[name]
+
+
+class Columns(Table):
+    """Columns of nodes or of elements, as blocks of the scratch."""
+
+    def __init__(self, name: str, length: int, scratch: Scratch) -> None:
+        super().__init__(name)
+        self.length, self.scratch = length, scratch
+
+    def place(self, column: int) -> int:
+        """First row of a column."""
+        return self.scratch.block(f"{self.name} {column}", self.length)
+
+    def entry(self, column: int, index: str) -> str:
+        """The number of lane `i` in a row of the column; "" is the first one."""
+        return f"s[({self.place(column)} + {index or 0}) * L + i]"
+
+
+@dataclass
+class Family:
+    """The elements of a force, the same in every island.
+
+    Attributes
+    ----------
+    nodes : of each element, by their numbers within the island, shape (e, k).
+    own : numbers of the elements in the force, shape (islands, e).
+    """
+
+    force: ElementForce
+    nodes: NDArray[np.int32]
+    own: Rows
+
+
+@dataclass(frozen=True)
+class Run:
+    """Elements that follow each other at even distances: element e has the nodes `nodes + e strides`."""
+
+    begin: int
+    count: int
+    nodes: tuple[int, ...]
+    strides: tuple[int, ...]
+
+
+def runs(nodes: NDArray[np.int32]) -> list[Run]:
+    """The elements, shape (e, k), in order, as few runs."""
+    result = []
+    begin = 0
+    while begin < len(nodes):
+        strides = nodes[begin + 1] - nodes[begin] if begin + 1 < len(nodes) else 0 * nodes[begin]
+        count = 1
+        while (strides >= 0).all() and begin + count < len(nodes):
+            if (nodes[begin + count] != nodes[begin] + count * strides).any():
+                break
+            count += 1
+        result.append(Run(begin, count, tuple(nodes[begin].tolist()), tuple(strides.tolist())))
+        begin += count
+    return result
+
+
+def families(system: ParticleSystem, members: Rows, first: NDArray[np.int64]) -> list[Family] | None:
+    """The elements of each force that is on, where all islands have the same; else None."""
+    islands = len(first) - 1
+    size = int(first[1])
+    if (np.diff(first) != size).any():
+        return None
+    place = np.full(len(system.particles), -1, np.intp)
+    place[members] = np.arange(len(members))
+    result = []
+    for force in system.forces:
+        if isinstance(force, ElementForce) and force.enabled:
+            rows = force.rows(system.particles)
+            mine = np.flatnonzero(place[rows[:, 0]] >= 0)
+            found = incidence(rows[mine], place, first)
+            count = np.diff(found.start)
+            if (count != count[0]).any():
+                return None
+            nodes = found.nodes.reshape(islands, -1, force.nodes)
+            if (nodes != nodes[0]).any():
+                return None
+            result.append(Family(force, nodes[0], mine[found.order].reshape(islands, -1)))
+    return result
+
+
+class LanesKernel:
+    """Advances islands of one topology.
+
+    Forces on elements that are switched off are left out, so another kernel is needed when they are switched on.
+    """
+
+    def __init__(self, system: ParticleSystem, solver: Solver, members: Rows, first: NDArray[np.int64]) -> None:
+        found = families(system, members, first)
+        assert found is not None
+        self.system, self.solver, self.families = system, solver, found
+        self.dtype = str(system.particles.dtype)
+        self.nodes = int(first[1])
+        self.apart = self.nodes | 1  # rows between components: multiples of 4096 bytes would collide in the cache
+        self.phases = phases(solver, self.dtype, system.velocity_dependent)
+        self.scratch = Scratch()
+        for name in [*regions(self.phases), "F"]:
+            self.scratch.block(name, 3 * self.apart)
+        self.binder = Binder(system.particles, Columns("C", self.nodes, self.scratch))
+        self.tables = [Columns(f"D{j}", len(f.nodes), self.scratch) for j, f in enumerate(self.families)]
+        self.staged: set[int] = set()  # numbers of the families that are a loop
+        self._at_time: list[str] = []
+        deriv = self._deriv()
+        width = [w for w in WIDTHS if self.scratch.rows * w * system.particles.dtype.itemsize <= ROOM]
+        self.width = WIDTHS[0] if self.staged else width[0] if width else WIDTHS[-1]
+        self.text = "\n".join([f"L = {self.width}", f"N = {self.nodes}", f"A = {self.apart}", "", "", *deriv, *self._step(), *MOVED, *self._run()])
+
+    @staticmethod
+    def fits(system: ParticleSystem, solver: Solver, members: Rows, first: NDArray[np.int64]) -> bool:
+        """Whether islands can be advanced like this: undisturbed, of one topology, by fixed steps, and all are born."""
+        return simple(system, solver) and len(first) > FEWEST and families(system, members, first) is not None
+
+    def title(self) -> str:
+        """What the kernel is, in a line."""
+        forces = ", ".join(f.name for f in self.system.forces) or "no force"
+        return f"islands of {self.nodes} particles side by side: {self.solver.name} under {forces}"
+
+    def columns(self) -> list[Columns]:
+        """Tables of all columns in the scratch."""
+        particle = self.binder.particle
+        assert isinstance(particle, Columns)
+        return [particle, *self.tables]
+
+    # ---------------------------------------------------------------------------------------- text
+
+    def _place(self, name: str, axis: int) -> int:
+        """First row of a component."""
+        return self.scratch.places[name] + axis * self.apart
+
+    def _deriv(self) -> list[str]:
+        """The function that adds up the forces, in listed order and element by element."""
+        lines: list[str] = []
+        group: list[str] = []  # forces on one particle that follow each other
+        fresh, j = True, 0
+        for k, force in enumerate(self.system.forces):
+            if isinstance(force, UnaryForce):
+                state = {n: f"s[{self._place(q, a)} * L + i]" for q in STATE for a, n in enumerate(_inputs(q))}
+                timed, adds = unary(self.binder, force, f"f{k}", state, "")
+                self._at_time += timed
+                group += adds
+            elif any(force is f.force for f in self.families):
+                lines += [*self._unary(group, fresh), *self._elements(j, f"f{k}")]
+                group, fresh, j = [], False, j + 1
+        lines += self._unary(group, fresh)
+        staged = max((9 * self.families[j].force.nodes for j in self.staged), default=0)
+        return [
+            "@njit(**FLAGS)",
+            f"def deriv(s, g, P, {', '.join(['t', *(f'E{j}' for j in sorted(self.staged))])}):",
+            *indented(self.binder.numbers.lines(), 1),
+            "    status = 0",
+            *indented(self._at_time, 1),
+            *indented(lines, 1),
+            "    return status",
+            "",
+            "",
+        ] + ([f"STAGE = {staged}", "", ""])
+
+    def _unary(self, group: list[str], fresh: bool) -> list[str]:
+        """The loop over all particles that adds forces; the first one clears."""
+        if not group and not fresh:
+            return []
+        forces = [(a, f"s[{self._place('F', k)} * L + i]") for k, a in enumerate(AXES)]
+        return [
+            f"for i in range({self.nodes} * L):",
+            *indented([f"f_{a} = {'R(0)' if fresh else entry}" for a, entry in forces], 1),
+            *indented(group, 1),
+            *indented([f"{entry} = f_{a}" for a, entry in forces], 1),
+        ]
+
+    def _elements(self, j: int, tag: str) -> list[str]:
+        """The elements of a family, one after the other."""
+        family = self.families[j]
+        if len(family.nodes) == 0:
+            return []
+        found = runs(family.nodes)
+        once, timed = self._law(j, tag, found[0])
+        self._at_time += timed
+        if len(found) * len(once) > UNROLLED:
+            self.staged.add(j)
+            return self._loop(j, tag)
+        lines = [f"# {family.force.name}"]
+        for run in found:
+            lines += [f"for e in range({run.count}):", "    for i in range(L):"]
+            lines += indented(self._law(j, tag, run)[0], 2)
+        return lines
+
+    def _law(self, j: int, tag: str, run: Run) -> tuple[list[str], list[str]]:
+        """Statements of one lane for element `e` of a run, and those of the time."""
+        force = self.families[j].force
+        state, targets = {"t": "R(t)"}, []
+        for b, (node, stride) in enumerate(zip(run.nodes, run.strides, strict=True)):
+            for q in STATE:
+                for a, name in enumerate(_inputs(q, b + 1)):
+                    state[name] = f"s[({self._place(q, a) + node} + {stride} * e) * L + i]"
+            targets += [f"s[({self._place('F', a) + node} + {stride} * e) * L + i]" for a in range(3)]
+        text = self.binder.law(force.traced, force, state, f"{run.begin} + e", self.tables[j], tag)
+        adds = [f"{target} = {target} + {out}" for target, out in zip(targets, text.outputs, strict=True)]
+        return [*text.lines, *adds], text.at_time
+
+    def _loop(self, j: int, tag: str) -> list[str]:
+        """The elements of a family as a loop: nodes to the stage, law, forces from the stage."""
+        force = self.families[j].force
+        state, bring, take = {"t": "R(t)"}, [], []
+        for b in range(force.nodes):
+            for q in STATE:
+                for a, name in enumerate(_inputs(q, b + 1)):
+                    if name in force.traced.program.arguments():
+                        row = 9 * b + 3 * STATE.index(q) + a
+                        state[name] = f"g[{row} * L + i]"
+                        bring.append(f"{state[name]} = s[np.uintp({self._place(q, a)} * L + i) + n{b}]")
+            take += [
+                f"s[np.uintp({self._place('F', a)} * L + i) + n{b}] += g[{9 * b + 6 + a} * L + i]" for a in range(3)
+            ]
+        text = self.binder.law(force.traced, force, state, "e", self.tables[j], tag)
+        stage = [f"g[{9 * b + 6 + a} * L + i]" for b in range(force.nodes) for a in range(3)]
+        return [
+            f"# {force.name}",
+            f"for e in range({len(self.families[j].nodes)}):",
+            *(f"    n{b} = np.uintp(E{j}[{force.nodes} * e + {b}]) * np.uintp(L)" for b in range(force.nodes)),
+            "    for i in range(L):",
+            *indented(bring, 2),
+            "    for i in range(L):",
+            *indented(text.lines, 2),
+            *indented([f"{entry} = {out}" for entry, out in zip(stage, text.outputs, strict=True)], 2),
+            "    for i in range(L):",
+            *indented(take, 2),
+        ]
+
+    def _step(self) -> list[str]:
+        """The functions of the phases, and the one that calls them in turn."""
+        functions, calls = [], []
+        stages = "".join(f", E{j}" for j in sorted(self.staged))
+        different = list(dict.fromkeys(tuple(p.lines) for p in self.phases))
+        for phase in self.phases:
+            calls += [
+                f"status |= deriv(s, g, P, {phase.time}{stages})",
+                f"phase{different.index(tuple(phase.lines))}(s, hr)",
+            ]
+        for number, lines in enumerate(different):
+            functions += ["@njit(**FLAGS)", f"def phase{number}(s, hr):", f"    for i in range({self.nodes} * L):"]
+            functions += [f"        w = {self.binder.attribute('w', '')}", "        free = w != R(0)"]
+            for k in range(3):
+                places = {r: f"s[{self._place(r, k)} * L + i]" for r in regions(self.phases)}
+                functions.append(f"        a = s[{self._place('F', k)} * L + i]")
+                functions.append("        a = select(free, a * w, R(0))")
+                functions += indented(entries(lines, places), 2)
+            functions += ["", ""]
+        step = ["@njit(**FLAGS)", f"def step(s, g, P, t, h{stages}):", "    status = 0", "    hr = R(h)"]
+        return [*functions, *step, *indented([*calls, "return status"], 1), "", ""]
+
+    def _run(self) -> list[str]:
+        stages = "".join(f", E{j}" for j in sorted(self.staged))
+        copies = []
+        if "X0" in self.scratch.places:
+            starts = [f"s[{self._place(f'{q}0', 0)} * L + i] = s[{self._place(q, 0)} * L + i]" for q in STATE]
+            copies = [f"        for i in range({3 * self.apart} * L):", *indented(starts, 3)]
+        blocks = [(table.place(c), table.length) for table in self.columns() for c in range(len(table.getters))]
+        fill = []
+        for b, (row, length) in enumerate(blocks):
+            fill += [
+                f"        o = O[{2 * b}] + tile * O[{2 * b + 1}]",
+                f"        for i in range({length} * L):",
+                f"            s[{row} * L + i] = K[o + i]",
+            ]
+        return [
+            "@njit(parallel=True, **FLAGS)",
+            f"def run(x, v, P, K, O{stages}, t0, dt, k0, count, status):",
+            "    islands = len(status)",
+            "    for tile in prange((islands + L - 1) // L):",
+            f"        s = np.zeros({self.scratch.rows} * L, R)",
+            "        g = np.empty(STAGE * L, R)",
+            "        load(s, 0, x, tile * L, islands)",
+            "        load(s, 3 * A * L, v, tile * L, islands)",
+            *copies,
+            *fill,
+            "        bad = 0",
+            "        for k in range(k0, k0 + count):",
+            "            t = t0 + k * dt",
+            f"            bad |= step(s, g, P, t, t0 + (k + 1) * dt - t{stages})",
+            "        keep(s, 0, x, tile * L, islands)",
+            "        keep(s, 3 * A * L, v, tile * L, islands)",
+            "        judge(s, bad, status, tile * L, islands)",
+            "",
+        ]
+
+
+MOVED = f'''@njit(**FLAGS)
+def load(s, offset, x, lo, islands):
+    """The islands from `lo` on, (x, y, z) of each node; the last one again where there are no more."""
+    for lane in range(L):
+        b = np.uintp(3 * N * min(lo + lane, islands - 1))
+        o = np.uintp(offset + lane)
+        for q in range(N):
+            s[o] = x[b]
+            s[o + np.uintp(A * L)] = x[b + np.uintp(1)]
+            s[o + np.uintp(2 * A * L)] = x[b + np.uintp(2)]
+            b += np.uintp(3)
+            o += np.uintp(L)
+
+
+@njit(**FLAGS)
+def keep(s, offset, x, lo, islands):
+    """The way back."""
+    for lane in range(min(L, islands - lo)):
+        b = np.uintp(3 * N * (lo + lane))
+        o = np.uintp(offset + lane)
+        for q in range(N):
+            x[b] = s[o]
+            x[b + np.uintp(1)] = s[o + np.uintp(A * L)]
+            x[b + np.uintp(2)] = s[o + np.uintp(2 * A * L)]
+            b += np.uintp(3)
+            o += np.uintp(L)
+
+
+@njit(**FLAGS)
+def judge(s, bad, status, lo, islands):
+    """Status of the islands: the state at the end shows whether it was ever not finite."""
+    z = np.zeros(L, R)
+    for j in range(6 * A):
+        for i in range(L):
+            z[i] += s[j * L + i] * R(0)
+    for lane in range(min(L, islands - lo)):
+        status[lo + lane] = bad if z[lane] == R(0) else {NOT_FINITE}
+
+
+'''.split("\n")
+
+
+class LanesGroup:
+    """Islands of one topology in the order of the kernel.
+
+    Parameters
+    ----------
+    members : particles of each island, one after the other, in the same order of nodes.
+    first : where each island begins in `members`, shape (islands + 1,).
+    """
+
+    def __init__(self, kernel: LanesKernel, members: Rows, first: NDArray[np.int64]) -> None:
+        self.kernel, self.islands = kernel, len(first) - 1
+        families_ = families(kernel.system, members, first)
+        assert families_ is not None
+        self.orders = [members.reshape(self.islands, -1), *(f.own for f in families_)]
+        self._raw: list[NDArray[Any]] = []  # columns as they were, in the order of the system
+        self._packed: tuple[NDArray[Any], NDArray[np.int64]] | None = None
+
+    def run(self, functions: Any, x: Any, v: Any, birth: Any, span: Span) -> NDArray[np.int64]:
+        """Advance positions and velocities, shape (3 * rows,), in place; status of each island."""
+        kernel = self.kernel
+        elements = [np.ascontiguousarray(kernel.families[j].nodes.ravel()) for j in sorted(kernel.staged)]
+        status = np.zeros(self.islands, np.int64)
+        functions["run"](
+            x, v, kernel.binder.numbers.array(), *self._columns(), *elements,
+            span.t0, span.dt, span.first, span.count, status,
+        )  # fmt: skip
+        return status
+
+    def functions(self) -> dict[str, Any]:
+        """The kernel's functions, compiled when first called."""
+        kernel = self.kernel
+        return vars(store.load(kernel.title(), kernel.text, kernel.dtype))
+
+    def _columns(self) -> tuple[NDArray[Any], NDArray[np.int64]]:
+        """All columns by tile, and where each begins and how far its next tile is: 0 if all islands have the same."""
+        tables = self.kernel.columns()
+        raw = [get() for table in tables for get in table.getters]
+        same = len(raw) == len(self._raw) and all(map(np.array_equal, raw, self._raw))
+        if self._packed is None or not same:
+            orders = [order for table, order in zip(tables, self.orders, strict=True) for _ in table.getters]
+            self._raw = [column.copy() for column in raw]
+            self._packed = self._tiles(raw, orders)
+        return self._packed
+
+    def _tiles(self, raw: list[NDArray[Any]], orders: list[Rows]) -> tuple[NDArray[Any], NDArray[np.int64]]:
+        width = self.kernel.width
+        tiles = -(-self.islands // width)
+        lanes = np.minimum(np.arange(tiles * width), self.islands - 1).reshape(tiles, width)
+        parts, where, begin = [], [], 0
+        for column, order in zip(raw, orders, strict=True):
+            values = column[order].astype(self.kernel.dtype)
+            common = bool((values == values[0]).all())
+            part = values[lanes[:1] if common else lanes].transpose(0, 2, 1).ravel()
+            where += [begin, 0 if common else values.shape[1] * width]
+            parts.append(part)
+            begin += len(part)
+        return np.concatenate(parts), np.array(where, np.int64)
