@@ -1,0 +1,182 @@
+"""Islands of one topology side by side: the bits of the reference, whoever is in the batch."""
+
+import numba
+import numpy as np
+import pytest
+
+import pointmass as pm
+from pointmass.engine import lanes, store
+from pointmass.engine.island import Span
+from pointmass.engine.lanes import LanesGroup, LanesKernel, runs
+from pointmass.engine.reference import ReferenceEngine
+from pointmass.solvers import SOLVERS
+
+FIXED = ["euler", "symplectic_euler", "midpoint", "heun", "rk4", "leapfrog", "yoshida4"]
+DT = 1 / 512
+
+
+def strands(islands=10, nodes=5, dtype=np.float64, extra=()):
+    """Strands of hair: pinned roots, stretch, bend and angle springs, and masses and lengths of their own."""
+    rng = np.random.default_rng(1)
+    x = np.zeros((islands, nodes, 3))
+    x[:, :, 0] = 0.1 * np.arange(nodes)
+    x += 0.01 * rng.standard_normal(x.shape)
+    m = rng.uniform(0.5, 1.5, islands * nodes)
+    particles = pm.Particles(x.reshape(-1, 3), 0.1 * rng.standard_normal((islands * nodes, 3)), m, dtype=dtype)
+    particles.tag("odd", np.arange(islands * nodes) % 2 == 1)
+    particles.pin(np.arange(islands) * nodes)
+    start = nodes * np.arange(islands)[:, None, None]
+    def elements(*offsets):
+        base = np.arange(nodes - max(offsets))
+        return (np.stack([base + o for o in offsets], axis=1)[None] + start).reshape(-1, len(offsets))
+    stiff = np.tile(rng.uniform(20, 40, nodes - 2), islands)
+    forces = [
+        pm.Springs(elements(0, 1), 50.0, 0.3),
+        pm.Gravity(),
+        pm.Drag(k="0.1*m"),
+        pm.Springs(elements(2, 0), stiff, lambda t: 0.2 + 0.1 * pm.sin(9 * t), rest=0.21),
+        pm.Gravity((1, 0, 0), on="odd"),
+        pm.Angles(elements(0, 1, 2), 0.01, 1e-4),
+        *extra,
+    ]
+    return pm.ParticleSystem(particles, forces)
+
+
+def group(system, solver, order=None):
+    islands = len(system.particles) // 5
+    members = np.arange(len(system.particles)).reshape(islands, -1)[order if order is not None else slice(None)].ravel()
+    first = 5 * np.arange(len(members) // 5 + 1)
+    assert LanesKernel.fits(system, solver, members, first)
+    kernel = LanesKernel(system, solver, members, first)
+    return LanesGroup(kernel, members, first), members
+
+
+def moved(system, solver, spans, order=None, jit=False):
+    """Positions and velocities after steps, in the order of the particles."""
+    run, members = group(system, solver, order)
+    kernel = run.kernel
+    functions = run.functions() if jit else store.plain(kernel.title(), kernel.text, kernel.dtype)
+    x, v = (np.ascontiguousarray(q[members]).ravel() for q in (system.particles.x, system.particles.v))
+    for begin, end in spans:
+        status = run.run(functions, x, v, None, Span(0.0, DT, begin, end - begin))
+        assert not status.any()
+    back = np.argsort(members)
+    return x.reshape(-1, 3)[back], v.reshape(-1, 3)[back]
+
+
+def expected(system, solver, steps):
+    engine = ReferenceEngine(system, solver)
+    for k in range(steps):
+        engine.step(k * DT, (k + 1) * DT)
+    return system.particles.x, system.particles.v
+
+
+@pytest.mark.parametrize("name", FIXED)
+def test_has_the_bits_of_the_reference(name):
+    system, solver = strands(9, 5), SOLVERS[name]()
+    x, v = moved(system, solver, [(0, 2)])
+    for got, wanted in zip((x, v), expected(system, solver, 2), strict=True):
+        np.testing.assert_array_equal(got, wanted)
+
+
+def test_many_elements_are_a_loop(monkeypatch):
+    monkeypatch.setattr(lanes, "UNROLLED", 10)
+    system, solver = strands(9, 5), pm.Leapfrog()
+    assert len(group(system, solver)[0].kernel.staged) == 3
+    x, v = moved(system, solver, [(0, 2)])
+    for got, wanted in zip((x, v), expected(system, solver, 2), strict=True):
+        np.testing.assert_array_equal(got, wanted)
+
+
+@pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 1e-12), (np.float32, 1e-4)])
+@pytest.mark.parametrize("staged", [False, True])
+def test_compiled_it_agrees_over_100_steps(monkeypatch, dtype, tolerance, staged):
+    if staged:
+        monkeypatch.setattr(lanes, "UNROLLED", 10)
+    system, solver = strands(70, 5, dtype), pm.SymplecticEuler()
+    x, v = moved(system, solver, [(0, 100)], jit=True)
+    for got, wanted in zip((x, v), expected(system, solver, 100), strict=True):
+        np.testing.assert_allclose(got, wanted, rtol=0, atol=tolerance)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_bits_depend_on_no_thread_batch_order_or_span(dtype):
+    solver = pm.SymplecticEuler()
+    system = strands(70, 5, dtype)
+    x, v = moved(system, solver, [(0, 100)], jit=True)
+    shuffled = np.random.default_rng(0).permutation(70)
+    most = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        one = moved(system, solver, [(0, 100)], jit=True)
+    finally:
+        numba.set_num_threads(most)
+    variants = [one, moved(system, solver, [(0, 1), (1, 40), (40, 100)], jit=True)]
+    variants.append(moved(system, solver, [(0, 100)], shuffled, jit=True))
+    for xs, vs in variants:
+        np.testing.assert_array_equal(xs, x)
+        np.testing.assert_array_equal(vs, v)
+    few = np.arange(12, 21)
+    run, members = group(system, solver, few)
+    xs, vs = (q[members].ravel() for q in (system.particles.x, system.particles.v))
+    run.run(run.functions(), xs, vs, None, Span(0.0, DT, 0, 100))
+    np.testing.assert_array_equal(xs, x[members].ravel())
+    np.testing.assert_array_equal(vs, v[members].ravel())
+
+
+def test_vectors():
+    run, _ = group(strands(70, 5, np.float32), pm.SymplecticEuler())
+    moved(run.kernel.system, pm.SymplecticEuler(), [(0, 1)], jit=True)
+    kernel = run.kernel
+    source = store.complete("lanes", kernel.text, kernel.dtype).replace('"cache": True', '"cache": False')
+    scope = {}
+    exec(compile(source, "<lanes>", "exec"), scope)
+    s = np.ones(kernel.scratch.rows * kernel.width, np.float32)
+    scope["phase0"](s, np.float32(0.1))
+    scope["deriv"](s, s, kernel.binder.numbers.array(), 0.0)
+    if numba.core.config.CPU_NAME or "avx2" in __import__("llvmlite.binding").binding.get_host_cpu_features():
+        for name in ("deriv", "phase0"):
+            text = "\n".join(scope[name].inspect_asm().values())
+            assert "mulps\t%ymm" in text or "mulps\t%zmm" in text or "%zmm" in text or "%ymm" in text
+            assert "scatter" not in text
+
+
+def test_the_island_that_diverges_is_named():
+    system = strands(9, 5)
+    run, members = group(system, pm.Euler())
+    functions = store.plain("", run.kernel.text, "float64")
+    x, v = system.particles.x.ravel().copy(), system.particles.v.ravel().copy()
+    v[3 * 5 * 4 + 7] = np.inf
+    status = run.run(functions, x, v, None, Span(0.0, DT, 0, 1))
+    assert status.tolist() == [0, 0, 0, 0, 1, 0, 0, 0, 0]
+
+
+def test_a_function_of_time_out_of_bounds_is_reported():
+    system = strands(9, 5)
+    system.forces[0].set(k_s=lambda t: 1 - 1000 * t)
+    run, _ = group(system, pm.Euler())
+    functions = store.plain("", run.kernel.text, "float64")
+    x, v = system.particles.x.ravel().copy(), system.particles.v.ravel().copy()
+    assert (run.run(functions, x, v, None, Span(0.0, DT, 0, 2)) == 2).all()
+
+
+def test_what_does_not_fit():
+    system = strands(9, 5)
+    members, first = np.arange(45), 5 * np.arange(10)
+    assert LanesKernel.fits(system, pm.RK4(), members, first)
+    assert LanesKernel.fits(system, pm.DormandPrince(adaptive=False), members, first)
+    assert not LanesKernel.fits(system, pm.DormandPrince(), members, first)
+    assert not LanesKernel.fits(system, pm.ImplicitEuler(), members, first)
+    assert not LanesKernel.fits(system, pm.RK4(), members, np.array([0, 5, 10, 45]))
+    walled = pm.ParticleSystem(strands(9, 5).particles, [pm.Gravity()], [pm.Plane()])
+    assert not LanesKernel.fits(walled, pm.RK4(), members, first)
+    other = pm.ParticleSystem(strands(9, 5).particles, [pm.Springs([(0, 1), (5, 7)])])
+    assert not LanesKernel.fits(other, pm.RK4(), members, first)
+
+
+def test_runs_follow_each_other_at_even_distances():
+    nodes = np.array([(0, 1), (1, 2), (2, 3), (7, 5), (1, 0), (3, 4), (5, 8)], np.int32)
+    found = runs(nodes)
+    rebuilt = [np.array(r.nodes) + e * np.array(r.strides) for r in found for e in range(r.count)]
+    np.testing.assert_array_equal(rebuilt, nodes)
+    assert [r.count for r in found] == [3, 1, 3]
