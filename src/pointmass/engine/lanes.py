@@ -4,8 +4,8 @@ Lane = island. A tile of islands is loaded once into a scratch, [component][node
 and is stored once. The loop over the elements is outside and the loop over the islands inside, so nothing is gathered:
 the operations of the island text in the same order, and the same bits. Tiles are always padded to full width.
 
-Few elements are printed one by one, with all offsets constant. Many are a loop, which brings the nodes of an element to
-a fixed place, where the law finds them.
+Elements whose nodes follow each other at even distances are one loop with constant offsets. A topology without order is a
+loop over a list of nodes, with a small stage for the forces of one element, so that the loop over lanes stays a vector.
 """
 
 from __future__ import annotations
@@ -199,7 +199,7 @@ class LanesKernel:
                 lines += [*self._unary(group, fresh), *self._elements(j, f"f{k}")]
                 group, fresh, j = [], False, j + 1
         lines += self._unary(group, fresh)
-        staged = max((9 * self.families[j].force.nodes for j in self.staged), default=0)
+        staged = max((3 * self.families[j].force.nodes for j in self.staged), default=0)
         return [
             "@njit(**FLAGS)",
             f"def deriv(s, g, P, {', '.join(['t', *(f'E{j}' for j in sorted(self.staged))])}):",
@@ -255,32 +255,25 @@ class LanesKernel:
         return [*text.lines, *adds], text.at_time
 
     def _loop(self, j: int, tag: str) -> list[str]:
-        """The elements of a family as a loop: nodes to the stage, law, forces from the stage."""
+        """The elements of a family as a loop: forces to the stage, which nothing else shares, and then to the nodes."""
         force = self.families[j].force
-        state, bring, take = {"t": "R(t)"}, [], []
+        state, take = {"t": "R(t)"}, []
+        stage = [f"g[{row} * L + i]" for row in range(3 * force.nodes)]
         for b in range(force.nodes):
+            at = f" * L + i) + n{b}]"
             for q in STATE:
-                for a, name in enumerate(_inputs(q, b + 1)):
-                    if name in force.traced.program.arguments():
-                        row = 9 * b + 3 * STATE.index(q) + a
-                        state[name] = f"g[{row} * L + i]"
-                        bring.append(f"{state[name]} = s[np.uintp({self._place(q, a)} * L + i) + n{b}]")
-            take += [
-                f"s[np.uintp({self._place('F', a)} * L + i) + n{b}] += g[{9 * b + 6 + a} * L + i]" for a in range(3)
-            ]
+                state |= {n: f"s[np.uintp({self._place(q, a)}{at}" for a, n in enumerate(_inputs(q, b + 1))}
+            take.append("for i in range(L):")
+            take += [f"    s[np.uintp({self._place('F', a)}{at} += {stage[3 * b + a]}" for a in range(3)]
         text = self.binder.law(force.traced, force, state, "e", self.tables[j], tag)
-        stage = [f"g[{9 * b + 6 + a} * L + i]" for b in range(force.nodes) for a in range(3)]
         return [
             f"# {force.name}",
             f"for e in range({len(self.families[j].nodes)}):",
             *(f"    n{b} = np.uintp(E{j}[{force.nodes} * e + {b}]) * np.uintp(L)" for b in range(force.nodes)),
             "    for i in range(L):",
-            *indented(bring, 2),
-            "    for i in range(L):",
             *indented(text.lines, 2),
             *indented([f"{entry} = {out}" for entry, out in zip(stage, text.outputs, strict=True)], 2),
-            "    for i in range(L):",
-            *indented(take, 2),
+            *indented(take, 1),
         ]
 
     def _step(self) -> list[str]:
