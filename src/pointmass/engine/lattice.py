@@ -188,14 +188,14 @@ class LatticeKernel:
         self.masks = sorted({c for _, c in boxes})
         self.row = Row()
         self.state = [self.row.component(f"{name} {a}") for name in STATE for a in AXES]
-        for name in [*regions(self.phases), "F"]:
+        for name in regions(self.phases):
             for a in AXES:
                 self.row.component(f"{name} {a}")
         self.binder = Binder(system.particles, Columns("C", self.row))
         self.tables = [Columns(f"D{k}", self.row) for k in range(len(found.stencils))]
         self.slots = 0  # numbers of all stencils at one corner
         row = self._row()
-        self.text = "\n".join([*self._constants(), *row, *self._step(), *self._tile(), *self._run()])
+        self.text = "\n".join([*self._constants(), *row, *self._phases(), *self._tile(), *self._run()])
 
     @staticmethod
     def fits(system: ParticleSystem, solver: Solver, members: Rows, first: NDArray[np.int64]) -> bool:
@@ -216,19 +216,18 @@ class LatticeKernel:
     def scratch(self, rows: int) -> int:
         """How many numbers the scratch of a tile needs."""
         width = self.width + 2 * self.pad
-        head = len(self.masks) + (self.reach + 1) * self.slots + 2
+        head = 3 + len(self.masks) + (self.reach + 1) * self.slots + 2
         return width * (head + (rows + 2) * len(self.row.places))
 
     # ---------------------------------------------------------------------------------------- text
 
     def _constants(self) -> list[str]:
-        masks = len(self.masks)
         return [
             f"WIDTH = {self.width + 2 * self.pad}",
             f"PAD = {self.pad}",
             f"INNER = {self.width}",
             f"ROW = {len(self.row.places)} * WIDTH",
-            f"RING = {masks} * WIDTH",
+            f"RING = {3 + len(self.masks)} * WIDTH",  # behind the forces on a row, and the masks
             f"SLOT = {self.slots} * WIDTH",
             f"HEAD = RING + {self.reach + 1} * SLOT + 2 * PAD",
             "",
@@ -257,7 +256,6 @@ class LatticeKernel:
                     terms += own
                     k += 1
                 sums += [f"# {force.name}", *(line for _, line in sorted(terms, key=lambda term: term[0]))]
-        forces = [self.row.component(f"F {a}") for a in AXES]
         rings = [f"z{d} = np.uintp(RING + (r + {self.reach + 1 - d}) % {self.reach + 1} * SLOT)" for d in range(self.reach + 1)]
         return [
             "@njit(**FLAGS)",
@@ -269,7 +267,7 @@ class LatticeKernel:
             "        for i in range(WIDTH):",
             *(f"            f_{a} = R(0)" for a in AXES),
             *indented(sums, 3),
-            *(f"            {_entry(f)} = f_{a}" for a, f in zip(AXES, forces, strict=True)),
+            *(f"            s[{k} * WIDTH + i] = f_{a}" for k, a in enumerate(AXES)),
             "    return status",
             "",
             "",
@@ -298,7 +296,7 @@ class LatticeKernel:
         text = self.binder.law(law, force, state, "", self.tables[k], tag)
         rows, columns = stencil.box
         ring = [f"s[z0 + np.uintp({slot + o} * WIDTH + PAD + i)]" for o in range(len(text.outputs))]
-        inside = f"inside = s[np.uintp({self.masks.index(columns)} * WIDTH + i)] != R(0)"
+        inside = f"inside = s[{3 + self.masks.index(columns)} * WIDTH + i] != R(0)"
         lines = [
             f"if r < m - {rows}:",
             "    for i in range(WIDTH):",
@@ -317,24 +315,28 @@ class LatticeKernel:
                     terms.append((int(middle), f"f_{a} = f_{a} {term[1]} {entry}"))
         return lines, text.at_time, terms
 
-    def _step(self) -> list[str]:
-        """The functions of the phases for a row, and the sweeps of a step over the rows of a tile."""
+    def _phases(self) -> list[str]:
+        """The functions of the phases for a row."""
         different = list(dict.fromkeys(tuple(p.lines) for p in self.phases))
         lines = []
         for number, phase in enumerate(different):
             lines += ["@njit(**FLAGS)", f"def phase{number}(s, b, hr):", "    for i in range(WIDTH):"]
             lines += [f"        w = {self.binder.attribute('w', '')}", "        free = w != R(0)"]
-            for a, axis in enumerate(AXES):
+            for a in range(3):
                 places = {r: self._state(r, a) for r in regions(self.phases)}
-                lines.append(f"        a = {_entry(self.row.component(f'F {axis}'))}")
-                lines.append("        a = select(free, a * w, R(0))")
+                lines.append(f"        a = select(free, s[{a} * WIDTH + i] * w, R(0))")
                 lines += indented(entries(phase, places), 2)
             lines += ["", ""]
-        sweeps = []
+        return lines
+
+    def _sweeps(self) -> list[str]:
+        """Statements of a step: a sweep over the rows for each phase."""
+        different = list(dict.fromkeys(tuple(p.lines) for p in self.phases))
+        lines = []
         for phase in self.phases:
-            sweeps += [
-                f"for q in range(RING, HEAD):",
-                "    s[q] = R(0)",
+            lines += [
+                "for i in range(RING, HEAD):",
+                "    s[i] = R(0)",
                 f"begin = lo + {self.reach} if lo > 0 else 0",
                 f"end = hi - {self.reach} if hi < m else m",
                 "for r in range(lo, end):",
@@ -345,38 +347,31 @@ class LatticeKernel:
                 "lo = begin",
                 "hi = end",
             ]
-        return [
-            *lines,
-            "@njit(**FLAGS)",
-            "def step(s, P, t, h, top, lo, hi, m):",
-            "    status = 0",
-            "    hr = R(h)",
-            *indented(sweeps, 1),
-            "    return status, lo, hi",
-            "",
-            "",
-        ]
+        return lines
 
     def _tile(self) -> list[str]:
         """The function that takes the particles of one tile through a few steps."""
         halo = self.reach * len(self.phases)
         load, fill, c = [], [], 0
         for j, place in enumerate(self.state):
-            load.append(f"bring(s, b + {place} * WIDTH, Y, ({j} * m + r) * n, left, n)")
+            load.append(f"bring(s, o + {place} * WIDTH, Y, ({j} * m + r) * n, left, n)")
         if "X0 x" in self.row.places:
             for q in STATE:
                 for a in AXES:
                     place = self.row.component(f"{q}0 {a}")
-                    load.append(f"bring(s, b + {place} * WIDTH, Y, ({3 * STATE.index(q) + AXES.index(a)} * m + r) * n, left, n)")
+                    load.append(f"bring(s, o + {place} * WIDTH, Y, ({3 * STATE.index(q) + AXES.index(a)} * m + r) * n, left, n)")
         for table in self.columns():
             for column in range(len(table.getters)):
                 place = self.row.component(f"{table.name} {column}")
-                fill.append(f"bring(s, b + {place} * WIDTH, K, O[{2 * c}] + r * O[{2 * c + 1}], left, n)")
+                fill.append(f"bring(s, o + {place} * WIDTH, K, O[{2 * c}] + r * O[{2 * c + 1}], left, n)")
                 c += 1
         masks = []
         for k, columns in enumerate(self.masks):
-            masks.append(f"s[{k} * WIDTH + i] = R(1) if left + i >= 0 and left + i < n - {columns} else R(0)")
-        store_ = [f"Z[({j} * m + r) * n + left + i] = s[b + {place} * WIDTH + i]" for j, place in enumerate(self.state)]
+            masks.append(f"s[{3 + k} * WIDTH + i] = R(1) if left + i >= 0 and left + i < n - {columns} else R(0)")
+        keep = [
+            f"keep(s, o + {place} * WIDTH + PAD, Z, ({j} * m + r) * n + left + PAD, min(INNER, n - left - PAD))"
+            for j, place in enumerate(self.state)
+        ]
         return [
             "@njit(**FLAGS)",
             "def bring(s, offset, Y, row, left, n):",
@@ -393,6 +388,14 @@ class LatticeKernel:
             "",
             "",
             "@njit(**FLAGS)",
+            "def keep(s, offset, Z, row, count):",
+            "    o = np.uintp(offset)",
+            "    z = np.uintp(row)",
+            "    for i in range(count):",
+            "        Z[z + np.uintp(i)] = s[o + np.uintp(i)]",
+            "",
+            "",
+            "@njit(**FLAGS)",
             "def tile(s, Y, Z, P, K, O, upper, lower, column, m, n, t0, dt, k, steps):",
             "    left = column * INNER - PAD",
             f"    top = max(0, upper - {halo} * steps)",
@@ -400,19 +403,19 @@ class LatticeKernel:
             "    for i in range(WIDTH):",
             *indented(masks, 2),
             "    for r in range(top, bottom):",
-            "        b = HEAD + (r - top) * ROW",
+            "        o = HEAD + (r - top) * ROW",
             *indented([*load, *fill], 2),
             "    lo = top",
             "    hi = bottom",
             "    status = 0",
             "    for q in range(k, k + steps):",
             "        t = t0 + q * dt",
-            "        bad, lo, hi = step(s, P, t, t0 + (q + 1) * dt - t, top, lo, hi, m)",
-            "        status |= bad",
+            "        h = t0 + (q + 1) * dt - t",
+            "        hr = R(h)",
+            *indented(self._sweeps(), 2),
             "    for r in range(upper, lower):",
-            "        b = HEAD + (r - top) * ROW",
-            "        for i in range(PAD, min(PAD + INNER, n - left)):",
-            *indented(store_, 3),
+            "        o = HEAD + (r - top) * ROW",
+            *indented(keep, 2),
             "    return status",
             "",
             "",
@@ -453,21 +456,6 @@ def together(x, v, Y, m, n, finite):
                 z += (Y[(a * m + r) * n + c] + Y[((3 + a) * m + r) * n + c]) * R(0)
         finite[r] = z == R(0)
 
-
-@njit(**FLAGS)
-def run(x, v, Y, Z, work, P, K, O, height, m, n, t0, dt, k0, count, status, finite):
-    apart(x, v, Y, m, n)
-    k = k0
-    flip = False
-    while k < k0 + count:
-        steps = min({self.most}, k0 + count - k)
-        if flip:
-            sweep(Z, Y, work, P, K, O, height, m, n, t0, dt, k, steps, status)
-        else:
-            sweep(Y, Z, work, P, K, O, height, m, n, t0, dt, k, steps, status)
-        flip = not flip
-        k += steps
-    together(x, v, Z if flip else Y, m, n, finite)
 '''.split("\n")
 
 
@@ -491,10 +479,14 @@ class LatticeGroup:
         kernel, m, n = self.kernel, self.grid.m, self.grid.n
         height, work = self._tiles()
         status, finite = np.zeros(len(work), np.int64), np.zeros(m, np.bool_)
-        functions["run"](
-            x, v, *self._state, work, kernel.binder.numbers.array(), *self._columns(), height, m, n,
-            span.t0, span.dt, span.first, span.count, status, finite,
-        )  # fmt: skip
+        here, there = self._state
+        data = (work, kernel.binder.numbers.array(), *self._columns(), height, m, n, span.t0, span.dt)
+        functions["apart"](x, v, here, m, n)
+        for k in range(span.first, span.first + span.count, kernel.most):
+            steps = min(kernel.most, span.first + span.count - k)
+            functions["sweep"](here, there, *data, k, steps, status)
+            here, there = there, here
+        functions["together"](x, v, here, m, n, finite)
         return np.array([np.bitwise_or.reduce(status) if finite.all() else NOT_FINITE])
 
     def functions(self) -> dict[str, Any]:
