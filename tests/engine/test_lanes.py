@@ -124,21 +124,28 @@ def test_bits_depend_on_no_thread_batch_order_or_span(dtype):
     np.testing.assert_array_equal(vs, v[members].ravel())
 
 
-def test_vectors():
-    run, _ = group(strands(70, 5, np.float32), pm.SymplecticEuler())
-    moved(run.kernel.system, pm.SymplecticEuler(), [(0, 1)], jit=True)
-    kernel = run.kernel
+@pytest.mark.parametrize("staged", [False, True])
+def test_vectors(monkeypatch, staged):
+    if not pytest.importorskip("llvmlite.binding").get_host_cpu_features().get("avx2"):
+        pytest.skip("this machine has no AVX2")
+    monkeypatch.setattr(lanes, "UNROLLED", 10 if staged else 10_000)
+    kernel = group(strands(70, 5, np.float32), pm.SymplecticEuler())[0].kernel
     source = store.complete("lanes", kernel.text, kernel.dtype).replace('"cache": True', '"cache": False')
     scope = {}
     exec(compile(source, "<lanes>", "exec"), scope)
-    s = np.ones(kernel.scratch.rows * kernel.width, np.float32)
+    s, g = np.ones(kernel.scratch.rows * kernel.width, np.float32), np.ones(9 * kernel.width, np.float32)
+    elements = [f.nodes.ravel() for j, f in enumerate(kernel.families) if j in kernel.staged]
     scope["phase0"](s, np.float32(0.1))
-    scope["deriv"](s, s, kernel.binder.numbers.array(), 0.0)
-    if numba.core.config.CPU_NAME or "avx2" in __import__("llvmlite.binding").binding.get_host_cpu_features():
-        for name in ("deriv", "phase0"):
-            text = "\n".join(scope[name].inspect_asm().values())
-            assert "mulps\t%ymm" in text or "mulps\t%zmm" in text or "%zmm" in text or "%ymm" in text
-            assert "scatter" not in text
+    scope["deriv"](s, g, kernel.binder.numbers.array(), 0.0, *elements)
+    assert _wide(scope["deriv"], "vsqrtps") >= len(kernel.families)
+    assert _wide(scope["phase0"], "mulps") >= 1 or _wide(scope["phase0"], "vfm") >= 1
+    assert not any(_wide(scope[name], "scatter") for name in ("deriv", "phase0"))
+
+
+def _wide(function, operation):
+    """How many instructions of a kind work on 8 or 16 numbers."""
+    lines = "\n".join(function.inspect_asm().values()).split("\n")
+    return sum(operation in line and ("%ymm" in line or "%zmm" in line) for line in lines)
 
 
 def test_the_island_that_diverges_is_named():

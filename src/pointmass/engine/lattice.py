@@ -35,6 +35,7 @@ SMALLEST = 16  # rows and columns of a grid that is worth tiles
 WIDTHS = (64, 128, 256)  # columns of a tile
 HEIGHT = 64  # rows of a tile, at most
 STEPS = 4  # steps in one pass, at most
+TERMS = 48  # terms of a sum in one loop: LLVM compares no more than some 100 addresses before it gives up vectors
 PAD = 8  # the halo has a multiple of so many columns
 
 
@@ -80,7 +81,7 @@ def grid(system: ParticleSystem, members: Rows) -> Grid | None:
     distances = [np.unique(abs(nodes[:, 1:] - nodes[:, :1])) for _, nodes, _ in found if len(nodes)]
     if not distances or max(map(len, distances)) > 4 * FARTHEST**2:
         return None
-    near = {int(d) + k for d in np.concatenate(distances) for k in (-1, 0, 1)}
+    near = {(int(d) + k) // r for d in np.concatenate(distances) for k in (-1, 0, 1) for r in range(1, FARTHEST + 1)}
     for n in sorted(near):
         m = len(members) // n if n >= SMALLEST else 0
         if m >= SMALLEST and m * n == len(members):
@@ -135,9 +136,19 @@ class Columns(Table):
 
 
 def _entry(component: int, rows: int = 0, columns: int = 0) -> str:
-    """A number of lane `i` in the row at `b`, or of a lane at a distance."""
+    """A number of lane `i` in the row `q`, or of a lane at a distance."""
     far = f"{rows} * ROW + " * (rows > 0) + f"{component} * WIDTH" + f" + {columns}" * (columns > 0)
-    return f"s[b + np.uintp({far} + i)]"
+    return f"q[{far} + i]"
+
+
+def _sum(terms: list[list[str]], fresh: bool) -> list[str]:
+    """A loop that adds up forces on the particles of a row."""
+    return [
+        "for i in range(WIDTH):",
+        *indented([f"f_{a} = {'R(0)' if fresh else f'f[{k} * WIDTH + i]'}" for k, a in enumerate(AXES)], 1),
+        *indented([line for term in terms for line in term], 1),
+        *indented([f"f[{k} * WIDTH + i] = f_{a}" for k, a in enumerate(AXES)], 1),
+    ]
 
 
 def _bases(traced: Traced) -> tuple[Traced, list[tuple[int, str] | None]]:
@@ -216,8 +227,8 @@ class LatticeKernel:
     def scratch(self, rows: int) -> int:
         """How many numbers the scratch of a tile needs."""
         width = self.width + 2 * self.pad
-        head = 3 + len(self.masks) + (self.reach + 1) * self.slots + 2
-        return width * (head + (rows + 2) * len(self.row.places))
+        head = 3 + len(self.masks) + (self.reach + 1) * (self.slots + 1)
+        return width * (head + (rows + self.reach + 1) * len(self.row.places))
 
     # ---------------------------------------------------------------------------------------- text
 
@@ -227,9 +238,10 @@ class LatticeKernel:
             f"PAD = {self.pad}",
             f"INNER = {self.width}",
             f"ROW = {len(self.row.places)} * WIDTH",
-            f"RING = {3 + len(self.masks)} * WIDTH",  # behind the forces on a row, and the masks
-            f"SLOT = {self.slots} * WIDTH",
-            f"HEAD = RING + {self.reach + 1} * SLOT + 2 * PAD",
+            "MASKS = 3 * WIDTH",  # behind the forces on a row
+            f"RING = MASKS + {len(self.masks)} * WIDTH",
+            f"SLOT = {self.slots + 1} * WIDTH",
+            f"HEAD = RING + {self.reach + 1} * SLOT",
             "",
             "",
         ]
@@ -237,7 +249,7 @@ class LatticeKernel:
     def _row(self) -> list[str]:
         """The function that evaluates all elements whose corner is in a row, and adds up the forces on that row."""
         elements: list[str] = []
-        sums: list[str] = []
+        sums: list[list[str]] = []
         timed: list[str] = []
         k = 0
         for number, force in enumerate(self.system.forces):
@@ -245,7 +257,7 @@ class LatticeKernel:
                 state = {n: self._state(q, a) for q in STATE for a, n in enumerate(vector_names(q.lower()))}
                 at_time, lines = unary(self.binder, force, f"f{number}", state, "")
                 timed += at_time
-                sums += lines
+                sums.append(lines)
             elif k < len(self.grid.stencils) and self.grid.stencils[k].force is force:
                 mine = [s for s in self.grid.stencils if s.force is force]
                 terms: list[tuple[int, str]] = []
@@ -255,23 +267,23 @@ class LatticeKernel:
                     timed += [line for line in at_time if line not in timed]
                     terms += own
                     k += 1
-                sums += [f"# {force.name}", *(line for _, line in sorted(terms, key=lambda term: term[0]))]
-        rings = [f"z{d} = np.uintp(RING + (r + {self.reach + 1 - d}) % {self.reach + 1} * SLOT)" for d in range(self.reach + 1)]
+                sums += [[line] for _, line in sorted(terms, key=lambda term: term[0])]
         return [
             "@njit(**FLAGS)",
-            "def row(s, b, P, t, r, m, whole):",
+            f"def row(q, masks, {self._rings()}, f, P, t, r, m, whole):",
             *indented(self.binder.numbers.lines(), 1),
             "    status = 0",
-            *indented([*timed, *rings, *elements], 1),
+            *indented([*timed, *elements], 1),
             "    if whole:",
-            "        for i in range(WIDTH):",
-            *(f"            f_{a} = R(0)" for a in AXES),
-            *indented(sums, 3),
-            *(f"            s[{k} * WIDTH + i] = f_{a}" for k, a in enumerate(AXES)),
+            *indented([line for k in range(0, max(1, len(sums)), TERMS) for line in _sum(sums[k : k + TERMS], k == 0)], 2),
             "    return status",
             "",
             "",
         ]
+
+    def _rings(self) -> str:
+        """Names of the forces of the elements with their corner in this row, in the one before, ..."""
+        return ", ".join(f"z{d}" for d in range(self.reach + 1))
 
     def _state(self, region: str, axis: int, shift: tuple[int, int] = (0, 0)) -> str:
         return _entry(self.row.component(f"{region} {AXES[axis]}"), *shift)
@@ -295,8 +307,8 @@ class LatticeKernel:
                 state |= {n: self._state(q, a, shift) for a, n in enumerate(names)}
         text = self.binder.law(law, force, state, "", self.tables[k], tag)
         rows, columns = stencil.box
-        ring = [f"s[z0 + np.uintp({slot + o} * WIDTH + PAD + i)]" for o in range(len(text.outputs))]
-        inside = f"inside = s[{3 + self.masks.index(columns)} * WIDTH + i] != R(0)"
+        ring = [f"z0[{slot + o} * WIDTH + PAD + i]" for o in range(len(text.outputs))]
+        inside = f"inside = masks[{self.masks.index(columns)} * WIDTH + i] != R(0)"
         lines = [
             f"if r < m - {rows}:",
             "    for i in range(WIDTH):",
@@ -311,7 +323,7 @@ class LatticeKernel:
             middle = stencil.own[(stencil.own.shape[0] + rows) // 2 - dr, (stencil.own.shape[1] + columns) // 2 - dc]
             for a, term in zip(AXES, outputs[3 * b : 3 * b + 3], strict=True):
                 if term is not None:
-                    entry = f"s[z{dr} + np.uintp({slot + term[0]} * WIDTH + PAD - {dc} + i)]"
+                    entry = f"z{dr}[{slot + term[0]} * WIDTH + PAD - {dc} + i]"
                     terms.append((int(middle), f"f_{a} = f_{a} {term[1]} {entry}"))
         return lines, text.at_time, terms
 
@@ -320,11 +332,11 @@ class LatticeKernel:
         different = list(dict.fromkeys(tuple(p.lines) for p in self.phases))
         lines = []
         for number, phase in enumerate(different):
-            lines += ["@njit(**FLAGS)", f"def phase{number}(s, b, hr):", "    for i in range(WIDTH):"]
+            lines += ["@njit(**FLAGS)", f"def phase{number}(q, f, hr):", "    for i in range(WIDTH):"]
             lines += [f"        w = {self.binder.attribute('w', '')}", "        free = w != R(0)"]
             for a in range(3):
                 places = {r: self._state(r, a) for r in regions(self.phases)}
-                lines.append(f"        a = select(free, s[{a} * WIDTH + i] * w, R(0))")
+                lines.append(f"        a = select(free, f[{a} * WIDTH + i] * w, R(0))")
                 lines += indented(entries(phase, places), 2)
             lines += ["", ""]
         return lines
@@ -332,6 +344,7 @@ class LatticeKernel:
     def _sweeps(self) -> list[str]:
         """Statements of a step: a sweep over the rows for each phase."""
         different = list(dict.fromkeys(tuple(p.lines) for p in self.phases))
+        depth = self.reach + 1
         lines = []
         for phase in self.phases:
             lines += [
@@ -340,10 +353,11 @@ class LatticeKernel:
                 f"begin = lo + {self.reach} if lo > 0 else 0",
                 f"end = hi - {self.reach} if hi < m else m",
                 "for r in range(lo, end):",
-                "    b = np.uintp(HEAD + (r - top) * ROW)",
-                f"    status |= row(s, b, P, {phase.time}, r, m, r >= begin)",
+                f"    q = s[HEAD + (r - top) * ROW : HEAD + (r - top + {self.reach + 1}) * ROW + WIDTH]",
+                *(f"    z{d} = s[RING + (r + {depth - d}) % {depth} * SLOT :][:SLOT]" for d in range(depth)),
+                f"    status |= row(q, masks, {self._rings()}, f, P, {phase.time}, r, m, r >= begin)",
                 "    if r >= begin:",
-                f"        phase{different.index(tuple(phase.lines))}(s, b, hr)",
+                f"        phase{different.index(tuple(phase.lines))}(q, f, hr)",
                 "lo = begin",
                 "hi = end",
             ]
@@ -367,7 +381,7 @@ class LatticeKernel:
                 c += 1
         masks = []
         for k, columns in enumerate(self.masks):
-            masks.append(f"s[{3 + k} * WIDTH + i] = R(1) if left + i >= 0 and left + i < n - {columns} else R(0)")
+            masks.append(f"masks[{k} * WIDTH + i] = R(1) if left + i >= 0 and left + i < n - {columns} else R(0)")
         keep = [
             f"keep(s, o + {place} * WIDTH + PAD, Z, ({j} * m + r) * n + left + PAD, min(INNER, n - left - PAD))"
             for j, place in enumerate(self.state)
@@ -400,6 +414,8 @@ class LatticeKernel:
             "    left = column * INNER - PAD",
             f"    top = max(0, upper - {halo} * steps)",
             f"    bottom = min(m, lower + {halo} * steps)",
+            "    f = s[:MASKS]",
+            "    masks = s[MASKS:RING]",
             "    for i in range(WIDTH):",
             *indented(masks, 2),
             "    for r in range(top, bottom):",
@@ -408,9 +424,9 @@ class LatticeKernel:
             "    lo = top",
             "    hi = bottom",
             "    status = 0",
-            "    for q in range(k, k + steps):",
-            "        t = t0 + q * dt",
-            "        h = t0 + (q + 1) * dt - t",
+            "    for now in range(k, k + steps):",
+            "        t = t0 + now * dt",
+            "        h = t0 + (now + 1) * dt - t",
             "        hr = R(h)",
             *indented(self._sweeps(), 2),
             "    for r in range(upper, lower):",
