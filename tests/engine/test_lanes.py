@@ -7,7 +7,7 @@ import pytest
 import pointmass as pm
 from pointmass.engine import lanes, store
 from pointmass.engine.island import Span
-from pointmass.engine.lanes import LanesGroup, LanesKernel, runs
+from pointmass.engine.lanes import LanesKernel, runs, topologies
 from pointmass.engine.reference import ReferenceEngine
 from pointmass.solvers import SOLVERS
 
@@ -26,9 +26,11 @@ def strands(islands=10, nodes=5, dtype=np.float64, extra=()):
     particles.tag("odd", np.arange(islands * nodes) % 2 == 1)
     particles.pin(np.arange(islands) * nodes)
     start = nodes * np.arange(islands)[:, None, None]
+
     def elements(*offsets):
         base = np.arange(nodes - max(offsets))
         return (np.stack([base + o for o in offsets], axis=1)[None] + start).reshape(-1, len(offsets))
+
     stiff = np.tile(rng.uniform(20, 40, nodes - 2), islands)
     forces = [
         pm.Springs(elements(0, 1), 50.0, 0.3),
@@ -42,25 +44,28 @@ def strands(islands=10, nodes=5, dtype=np.float64, extra=()):
     return pm.ParticleSystem(particles, forces)
 
 
-def group(system, solver, order=None):
+def group(system, solver, order=None, jit=True):
+    """The members, and their particles in the order of the lanes."""
     islands = len(system.particles) // 5
-    members = np.arange(len(system.particles)).reshape(islands, -1)[order if order is not None else slice(None)].ravel()
-    first = 5 * np.arange(len(members) // 5 + 1)
-    assert LanesKernel.fits(system, solver, members, first)
-    kernel = LanesKernel(system, solver, members, first)
-    return LanesGroup(kernel, members, first), members
+    order = np.arange(islands) if order is None else order
+    rows = np.arange(len(system.particles)).reshape(islands, -1)[order].ravel()
+    (topology,) = topologies(system, rows, np.repeat(order, 5))
+    assert LanesKernel.fits(system, solver)
+    kernel = LanesKernel(system, solver, topology)
+    if not jit:
+        kernel.functions = store.plain(kernel.title, kernel.text, kernel.dtype)
+    return kernel.members(topology), topology.rows.ravel()
 
 
 def moved(system, solver, spans, order=None, jit=False):
-    """Positions and velocities after steps, in the order of the particles."""
-    run, members = group(system, solver, order)
-    kernel = run.kernel
-    functions = run.functions() if jit else store.plain(kernel.title(), kernel.text, kernel.dtype)
-    x, v = (np.ascontiguousarray(q[members]).ravel() for q in (system.particles.x, system.particles.v))
+    """Positions and velocities after steps, of the particles in their own order."""
+    members, rows = group(system, solver, order, jit)
+    x, v = (np.ascontiguousarray(q[rows]).ravel() for q in (system.particles.x, system.particles.v))
     for begin, end in spans:
-        status = run.run(functions, x, v, None, Span(0.0, DT, begin, end - begin))
-        assert not status.any()
-    back = np.argsort(members)
+        outcome = members.run(x, v, None, Span(0.0, DT, begin, end - begin), {})
+        assert outcome.good
+        np.testing.assert_array_equal(outcome.reach, [np.abs(x).max(), np.abs(v).max()])
+    back = np.argsort(rows)
     return x.reshape(-1, 3)[back], v.reshape(-1, 3)[back]
 
 
@@ -116,12 +121,10 @@ def test_bits_depend_on_no_thread_batch_order_or_span(dtype):
     for xs, vs in variants:
         np.testing.assert_array_equal(xs, x)
         np.testing.assert_array_equal(vs, v)
-    few = np.arange(12, 21)
-    run, members = group(system, solver, few)
-    xs, vs = (q[members].ravel() for q in (system.particles.x, system.particles.v))
-    run.run(run.functions(), xs, vs, None, Span(0.0, DT, 0, 100))
-    np.testing.assert_array_equal(xs, x[members].ravel())
-    np.testing.assert_array_equal(vs, v[members].ravel())
+    rows = np.arange(60, 105)
+    few = moved(system, solver, [(0, 100)], np.arange(12, 21), jit=True)
+    np.testing.assert_array_equal(few[0], x[rows])
+    np.testing.assert_array_equal(few[1], v[rows])
 
 
 @pytest.mark.parametrize("staged", [False, True])
@@ -136,7 +139,7 @@ def test_vectors(monkeypatch, staged):
     s, g = np.ones(kernel.scratch.rows * kernel.width, np.float32), np.ones(9 * kernel.width, np.float32)
     elements = [f.nodes.ravel() for j, f in enumerate(kernel.families) if j in kernel.staged]
     scope["phase0"](s, np.float32(0.1))
-    scope["deriv"](s, g, kernel.binder.numbers.array(), 0.0, *elements)
+    scope["deriv"](s, g, kernel.binder.numbers.array(), *elements, 0.0)
     assert _wide(scope["deriv"], "vsqrtps") >= len(kernel.families)
     assert _wide(scope["phase0"], "mulps") >= 1 or _wide(scope["phase0"], "vfm") >= 1
     assert not any(_wide(scope[name], "scatter") for name in ("deriv", "phase0"))
@@ -148,37 +151,44 @@ def _wide(function, operation):
     return sum(operation in line and ("%ymm" in line or "%zmm" in line) for line in lines)
 
 
-def test_the_island_that_diverges_is_named():
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_an_island_that_diverges_is_noticed():
     system = strands(9, 5)
-    run, members = group(system, pm.Euler())
-    functions = store.plain("", run.kernel.text, "float64")
+    members, _ = group(system, pm.Euler(), jit=False)
     x, v = system.particles.x.ravel().copy(), system.particles.v.ravel().copy()
     v[3 * 5 * 4 + 7] = np.inf
-    status = run.run(functions, x, v, None, Span(0.0, DT, 0, 1))
-    assert status.tolist() == [0, 0, 0, 0, 1, 0, 0, 0, 0]
+    outcome = members.run(x, v, None, Span(0.0, DT, 0, 1), {})
+    assert not outcome.good
 
 
-def test_a_function_of_time_out_of_bounds_is_reported():
+def test_a_function_of_time_out_of_bounds_is_noticed():
     system = strands(9, 5)
     system.forces[0].set(k_s=lambda t: 1 - 1000 * t)
-    run, _ = group(system, pm.Euler())
-    functions = store.plain("", run.kernel.text, "float64")
+    members, _ = group(system, pm.Euler(), jit=False)
     x, v = system.particles.x.ravel().copy(), system.particles.v.ravel().copy()
-    assert (run.run(functions, x, v, None, Span(0.0, DT, 0, 2)) == 2).all()
+    assert members.run(x, v, None, Span(0.0, DT, 0, 1), {}).good
+    assert not members.run(x, v, None, Span(0.0, DT, 0, 2), {}).good
 
 
 def test_what_does_not_fit():
     system = strands(9, 5)
-    members, first = np.arange(45), 5 * np.arange(10)
-    assert LanesKernel.fits(system, pm.RK4(), members, first)
-    assert LanesKernel.fits(system, pm.DormandPrince(adaptive=False), members, first)
-    assert not LanesKernel.fits(system, pm.DormandPrince(), members, first)
-    assert not LanesKernel.fits(system, pm.ImplicitEuler(), members, first)
-    assert not LanesKernel.fits(system, pm.RK4(), members, np.array([0, 5, 10, 45]))
-    walled = pm.ParticleSystem(strands(9, 5).particles, [pm.Gravity()], [pm.Plane()])
-    assert not LanesKernel.fits(walled, pm.RK4(), members, first)
-    other = pm.ParticleSystem(strands(9, 5).particles, [pm.Springs([(0, 1), (5, 7)])])
-    assert not LanesKernel.fits(other, pm.RK4(), members, first)
+    assert LanesKernel.fits(system, pm.RK4())
+    assert LanesKernel.fits(system, pm.DormandPrince(adaptive=False))
+    assert not LanesKernel.fits(system, pm.DormandPrince())
+    assert not LanesKernel.fits(system, pm.ImplicitEuler())
+    assert not LanesKernel.fits(pm.ParticleSystem(strands(9, 5).particles, [pm.Gravity()], [pm.Plane()]), pm.RK4())
+    assert not LanesKernel.fits(pm.ParticleSystem(pm.Particles([[0, 0, 0]]), [pm.Flow((1, 0, 0))]), pm.RK4())
+
+
+def test_islands_by_topology():
+    pairs = [(3 * k + a, 3 * k + b) for k in range(20) for a, b in (((0, 1), (1, 2)) if k % 2 else ((1, 2), (0, 1)))]
+    system = pm.ParticleSystem(pm.Particles(np.zeros((64, 3))), [pm.Springs([*pairs, (60, 61)]), pm.Gravity()])
+    labels = system.island_of_particle
+    order = np.argsort(labels, kind="stable")
+    odd, even = sorted(topologies(system, order, labels[order]), key=lambda t: -t.rows[0, 0])
+    np.testing.assert_array_equal(even.rows, [[6 * k, 6 * k + 1, 6 * k + 2] for k in range(10)])
+    np.testing.assert_array_equal(odd.families[0].nodes, [(0, 1), (1, 2)])
+    np.testing.assert_array_equal(even.families[0].own, [[4 * k, 4 * k + 1] for k in range(10)])
 
 
 def test_runs_follow_each_other_at_even_distances():

@@ -1,16 +1,18 @@
 """The fast path of many islands of one topology: hair, snakes, fish, ensembles.
 
-Lane = island. A tile of islands is loaded once into a scratch, [component][node][lane], makes all steps of a span there,
-and is stored once. The loop over the elements is outside and the loop over the islands inside, so nothing is gathered:
-the operations of the island text in the same order, and the same bits. Tiles are always padded to full width.
+Lane = island. A tile of islands is loaded once into a scratch, [component][node][lane], makes all steps of a span
+there, and is stored once. The loop over the elements is outside and the loop over the islands inside, so nothing is
+gathered: the operations of the island text in the same order, and the same bits. Tiles are always padded to full width.
 
-Elements whose nodes follow each other at even distances are one loop with constant offsets. A topology without order is a
-loop over a list of nodes, with a small stage for the forces of one element, so that the loop over lanes stays a vector.
+Elements whose nodes follow each other at even distances are one loop with constant offsets. A topology without order is
+a loop over a list of nodes, with a small stage for the forces of one element, so that the loop over lanes stays a
+vector.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,17 +21,20 @@ from numpy.typing import NDArray
 from pointmass.engine import store
 from pointmass.engine.binding import Binder, Table
 from pointmass.engine.forces import incidence, unary
-from pointmass.engine.island import NOT_FINITE, Rows, Span
-from pointmass.engine.phases import STATE, entries, phases, regions, simple
+from pointmass.engine.island import NOT_FINITE, Array, Outcome, Rows, Span
+from pointmass.engine.phases import REACHED, STATE, entries, phases, regions, simple
 from pointmass.engine.printing import indented
+from pointmass.engine.threads import spread
 from pointmass.laws.elements import ElementForce
 from pointmass.laws.unary import UnaryForce
-from pointmass.solvers.base import Solver
+from pointmass.solvers.advance import Stats
+from pointmass.solvers.base import Memory, Solver
 from pointmass.system import ParticleSystem
 from pointmass.tracing.trace import vector_names
 
 AXES = "xyz"
 FEWEST = 8  # islands that are worth a tile
+GRAIN = 2  # tiles that are worth a thread
 UNROLLED = 1500  # statements of elements that are printed one by one
 WIDTHS = (64, 32, 16)  # lanes of a tile
 ROOM = 28_000  # bytes of a scratch that fits into the first cache
@@ -112,27 +117,51 @@ def runs(nodes: NDArray[np.int32]) -> list[Run]:
     return result
 
 
-def families(system: ParticleSystem, members: Rows, first: NDArray[np.int64]) -> list[Family] | None:
-    """The elements of each force that is on, where all islands have the same; else None."""
-    islands = len(first) - 1
-    size = int(first[1])
-    if (np.diff(first) != size).any():
-        return None
+@dataclass(frozen=True, eq=False)
+class Topology:
+    """Islands that are made alike.
+
+    Attributes
+    ----------
+    rows : particles, shape (islands, nodes); a node is the same in every island.
+    families : elements of each force that is on.
+    """
+
+    rows: Rows
+    families: list[Family]
+
+
+def topologies(system: ParticleSystem, rows: Rows, labels: Rows) -> list[Topology]:
+    """Islands by what they are made of; those of which there are few are left out.
+
+    Parameters
+    ----------
+    rows : particles of each island, one island after the other.
+    labels : island of each, shape (rows,).
+    """
+    first = np.append(np.flatnonzero(np.diff(labels, prepend=-1)), len(rows)).astype(np.int64)
     place = np.full(len(system.particles), -1, np.intp)
-    place[members] = np.arange(len(members))
-    result = []
+    place[rows] = np.arange(len(rows))
+    found = []
     for force in system.forces:
         if isinstance(force, ElementForce) and force.enabled:
-            rows = force.rows(system.particles)
-            mine = np.flatnonzero(place[rows[:, 0]] >= 0)
-            found = incidence(rows[mine], place, first)
-            count = np.diff(found.start)
-            if (count != count[0]).any():
-                return None
-            nodes = found.nodes.reshape(islands, -1, force.nodes)
-            if (nodes != nodes[0]).any():
-                return None
-            result.append(Family(force, nodes[0], mine[found.order].reshape(islands, -1)))
+            nodes = force.rows(system.particles)
+            mine = np.flatnonzero(place[nodes[:, 0]] >= 0)
+            sorted_ = incidence(nodes[mine], place, first)
+            found.append((force, mine[sorted_.order], sorted_.nodes.reshape(-1, force.nodes), sorted_.start))
+    alike: dict[Any, list[int]] = {}
+    for island in range(len(first) - 1):
+        parts = [nodes[start[island] : start[island + 1]].tobytes() for _, _, nodes, start in found]
+        alike.setdefault((int(first[island + 1] - first[island]), *parts), []).append(island)
+    result = []
+    for (size, *_), islands in alike.items():
+        if len(islands) >= FEWEST and size > 1:
+            families = []
+            for force, own, nodes, start in found:
+                begin, end = int(start[islands[0]]), int(start[islands[0] + 1])
+                each = own[start[islands][:, None] + np.arange(end - begin)]
+                families.append(Family(force, nodes[begin:end].astype(np.int32), each))
+            result.append(Topology(rows[first[islands][:, None] + np.arange(size)], families))
     return result
 
 
@@ -142,12 +171,10 @@ class LanesKernel:
     Forces on elements that are switched off are left out, so another kernel is needed when they are switched on.
     """
 
-    def __init__(self, system: ParticleSystem, solver: Solver, members: Rows, first: NDArray[np.int64]) -> None:
-        found = families(system, members, first)
-        assert found is not None
-        self.system, self.solver, self.families = system, solver, found
+    def __init__(self, system: ParticleSystem, solver: Solver, topology: Topology) -> None:
+        self.system, self.solver, self.families = system, solver, topology.families
         self.dtype = str(system.particles.dtype)
-        self.nodes = int(first[1])
+        self.nodes = topology.rows.shape[1]
         self.apart = self.nodes | 1  # rows between components: multiples of 4096 bytes would collide in the cache
         self.phases = phases(solver, self.dtype, system.velocity_dependent)
         self.scratch = Scratch()
@@ -160,17 +187,29 @@ class LanesKernel:
         deriv = self._deriv()
         width = [w for w in WIDTHS if self.scratch.rows * w * system.particles.dtype.itemsize <= ROOM]
         self.width = WIDTHS[0] if self.staged else width[0] if width else WIDTHS[-1]
-        self.text = "\n".join([f"L = {self.width}", f"N = {self.nodes}", f"A = {self.apart}", "", "", *deriv, *self._step(), *MOVED, *self._run()])
+        constants = [f"L = {self.width}", f"N = {self.nodes}", f"A = {self.apart}", "", "", ""]
+        parts = ["\n".join(constants), self.binder.functions, REACHED, *MOVED]
+        self.text = "".join([*parts, "\n".join([*deriv, *self._step(), *self._run()])])
 
     @staticmethod
-    def fits(system: ParticleSystem, solver: Solver, members: Rows, first: NDArray[np.int64]) -> bool:
-        """Whether islands can be advanced like this: undisturbed, of one topology, by fixed steps, and all are born."""
-        return simple(system, solver) and len(first) > FEWEST and families(system, members, first) is not None
+    def fits(system: ParticleSystem, solver: Solver) -> bool:
+        """Whether islands of one topology can be advanced like this: undisturbed, by fixed steps. All must be born."""
+        return simple(system, solver)
 
+    @property
     def title(self) -> str:
         """What the kernel is, in a line."""
         forces = ", ".join(f.name for f in self.system.forces) or "no force"
         return f"islands of {self.nodes} particles side by side: {self.solver.name} under {forces}"
+
+    @cached_property
+    def functions(self) -> dict[str, Any]:
+        """By name; each is compiled when it is first called."""
+        return vars(store.load(self.title, self.text, self.dtype))
+
+    def members(self, topology: Topology) -> LanesMembers:
+        """Islands to be advanced, in the order of `topology.rows`."""
+        return LanesMembers(self, topology)
 
     def columns(self) -> list[Columns]:
         """Tables of all columns in the scratch."""
@@ -182,7 +221,7 @@ class LanesKernel:
 
     def _place(self, name: str, axis: int) -> int:
         """First row of a component."""
-        return self.scratch.places[name] + axis * self.apart
+        return int(self.scratch.places[name] + axis * self.apart)
 
     def _deriv(self) -> list[str]:
         """The function that adds up the forces, in listed order and element by element."""
@@ -199,10 +238,13 @@ class LanesKernel:
                 lines += [*self._unary(group, fresh), *self._elements(j, f"f{k}")]
                 group, fresh, j = [], False, j + 1
         lines += self._unary(group, fresh)
-        staged = max((3 * self.families[j].force.nodes for j in self.staged), default=0)
+        stage = max((3 * self.families[j].force.nodes for j in self.staged), default=0)
         return [
+            f"STAGE = {stage}",
+            "",
+            "",
             "@njit(**FLAGS)",
-            f"def deriv(s, g, P, {', '.join(['t', *(f'E{j}' for j in sorted(self.staged))])}):",
+            f"def deriv(s, g, {self._shared()}, t):",
             *indented(self.binder.numbers.lines(), 1),
             "    status = 0",
             *indented(self._at_time, 1),
@@ -210,7 +252,12 @@ class LanesKernel:
             "    return status",
             "",
             "",
-        ] + ([f"STAGE = {staged}", "", ""])
+        ]
+
+    def _shared(self) -> str:
+        """Arrays that all islands share: numbers, grids, and the nodes of elements that are a loop."""
+        arrays = [name for name in self.binder.arrays if name != self.binder.particle.name]
+        return ", ".join([*arrays, *(f"E{j}" for j in sorted(self.staged))])
 
     def _unary(self, group: list[str], fresh: bool) -> list[str]:
         """The loop over all particles that adds forces; the first one clears."""
@@ -279,11 +326,10 @@ class LanesKernel:
     def _step(self) -> list[str]:
         """The functions of the phases, and the one that calls them in turn."""
         functions, calls = [], []
-        stages = "".join(f", E{j}" for j in sorted(self.staged))
         different = list(dict.fromkeys(tuple(p.lines) for p in self.phases))
         for phase in self.phases:
             calls += [
-                f"status |= deriv(s, g, P, {phase.time}{stages})",
+                f"status |= deriv(s, g, {self._shared()}, {phase.time})",
                 f"phase{different.index(tuple(phase.lines))}(s, hr)",
             ]
         for number, lines in enumerate(different):
@@ -295,11 +341,11 @@ class LanesKernel:
                 functions.append("        a = select(free, a * w, R(0))")
                 functions += indented(entries(lines, places), 2)
             functions += ["", ""]
-        step = ["@njit(**FLAGS)", f"def step(s, g, P, t, h{stages}):", "    status = 0", "    hr = R(h)"]
+        step = ["@njit(**FLAGS)", f"def step(s, g, {self._shared()}, t, h):", "    status = 0", "    hr = R(h)"]
         return [*functions, *step, *indented([*calls, "return status"], 1), "", ""]
 
     def _run(self) -> list[str]:
-        stages = "".join(f", E{j}" for j in sorted(self.staged))
+        """The kernel itself: some tiles over a span."""
         copies = []
         if "X0" in self.scratch.places:
             starts = [f"s[{self._place(f'{q}0', 0)} * L + i] = s[{self._place(q, 0)} * L + i]" for q in STATE]
@@ -313,12 +359,11 @@ class LanesKernel:
                 f"            s[{row} * L + i] = K[o + i]",
             ]
         return [
-            "@njit(parallel=True, **FLAGS)",
-            f"def run(x, v, P, K, O{stages}, t0, dt, k0, count, status):",
-            "    islands = len(status)",
-            "    for tile in prange((islands + L - 1) // L):",
-            f"        s = np.zeros({self.scratch.rows} * L, R)",
-            "        g = np.empty(STAGE * L, R)",
+            "@njit(**FLAGS)",
+            f"def run(first, last, islands, x, v, {self._shared()}, K, O, t0, dt, k0, count, status, reach):",
+            f"    s = np.zeros({self.scratch.rows} * L, R)",
+            "    g = np.empty(STAGE * L, R)",
+            "    for tile in range(first, last):",
             "        load(s, 0, x, tile * L, islands)",
             "        load(s, 3 * A * L, v, tile * L, islands)",
             *copies,
@@ -326,15 +371,18 @@ class LanesKernel:
             "        bad = 0",
             "        for k in range(k0, k0 + count):",
             "            t = t0 + k * dt",
-            f"            bad |= step(s, g, P, t, t0 + (k + 1) * dt - t{stages})",
+            f"            bad |= step(s, g, {self._shared()}, t, t0 + (k + 1) * dt - t)",
+            "        far, fast = reached(s, 0, 3 * A * L), reached(s, 3 * A * L, 6 * A * L)",
+            f"        status[tile] = bad if far < np.inf and fast < np.inf else {NOT_FINITE}",
+            "        reach[tile, 0] = far",
+            "        reach[tile, 1] = fast",
             "        keep(s, 0, x, tile * L, islands)",
             "        keep(s, 3 * A * L, v, tile * L, islands)",
-            "        judge(s, bad, status, tile * L, islands)",
             "",
         ]
 
 
-MOVED = f'''@njit(**FLAGS)
+MOVED = '''@njit(**FLAGS)
 def load(s, offset, x, lo, islands):
     """The islands from `lo` on, (x, y, z) of each node; the last one again where there are no more."""
     for lane in range(L):
@@ -362,52 +410,30 @@ def keep(s, offset, x, lo, islands):
             o += np.uintp(L)
 
 
-@njit(**FLAGS)
-def judge(s, bad, status, lo, islands):
-    """Status of the islands: the state at the end shows whether it was ever not finite."""
-    z = np.zeros(L, R)
-    for j in range(6 * A):
-        for i in range(L):
-            z[i] += s[j * L + i] * R(0)
-    for lane in range(min(L, islands - lo)):
-        status[lo + lane] = bad if z[lane] == R(0) else {NOT_FINITE}
+'''
 
 
-'''.split("\n")
+class LanesMembers:
+    """Islands of one topology, in the order of the kernel's lanes."""
 
-
-class LanesGroup:
-    """Islands of one topology in the order of the kernel.
-
-    Parameters
-    ----------
-    members : particles of each island, one after the other, in the same order of nodes.
-    first : where each island begins in `members`, shape (islands + 1,).
-    """
-
-    def __init__(self, kernel: LanesKernel, members: Rows, first: NDArray[np.int64]) -> None:
-        self.kernel, self.islands = kernel, len(first) - 1
-        families_ = families(kernel.system, members, first)
-        assert families_ is not None
-        self.orders = [members.reshape(self.islands, -1), *(f.own for f in families_)]
+    def __init__(self, kernel: LanesKernel, topology: Topology) -> None:
+        self.kernel, self.islands = kernel, len(topology.rows)
+        self.orders = [topology.rows, *(f.own for f in topology.families)]
         self._raw: list[NDArray[Any]] = []  # columns as they were, in the order of the system
         self._packed: tuple[NDArray[Any], NDArray[np.int64]] | None = None
 
-    def run(self, functions: Any, x: Any, v: Any, birth: Any, span: Span) -> NDArray[np.int64]:
-        """Advance positions and velocities, shape (3 * rows,), in place; status of each island."""
+    def run(self, x: Array, v: Array, births: Array | None, span: Span, memory: Memory) -> Outcome:
+        """Advance positions and velocities, shape (3 * rows,), in place."""
         kernel = self.kernel
-        elements = [np.ascontiguousarray(kernel.families[j].nodes.ravel()) for j in sorted(kernel.staged)]
-        status = np.zeros(self.islands, np.int64)
-        functions["run"](
-            x, v, kernel.binder.numbers.array(), *self._columns(), *elements,
-            span.t0, span.dt, span.first, span.count, status,
-        )  # fmt: skip
-        return status
-
-    def functions(self) -> dict[str, Any]:
-        """The kernel's functions, compiled when first called."""
-        kernel = self.kernel
-        return vars(store.load(kernel.title(), kernel.text, kernel.dtype))
+        elements = [np.ascontiguousarray(kernel.families[j].nodes).ravel() for j in sorted(kernel.staged)]
+        data = (*kernel.binder.common(), *elements, *self._columns())
+        tiles = -(-self.islands // kernel.width)
+        status, reach = np.zeros(tiles, np.int64), np.zeros((tiles, 2), x.dtype)
+        grid = (span.t0, span.dt, span.first, span.count)
+        run = kernel.functions["run"]
+        spread(lambda lo, hi: run(lo, hi, self.islands, x, v, *data, *grid, status, reach), tiles, GRAIN)
+        work = Stats(span.count, 0, span.count * len(kernel.phases))
+        return Outcome(not status.any(), reach.max(axis=0).astype(np.float64), work)
 
     def _columns(self) -> tuple[NDArray[Any], NDArray[np.int64]]:
         """All columns by tile, and where each begins and how far its next tile is: 0 if all islands have the same."""

@@ -1,15 +1,16 @@
 """The fast path of one large island whose elements are shifts of a stencil on a row-major grid: cloth.
 
-A tile of the grid is loaded with a halo into a scratch, [row][component][column], makes a few steps there, and its inner
-part is stored; tiles overlap by what the halo loses in these steps, and compute it twice. A step sweeps over the rows:
-each stencil is evaluated once for a whole row, into a ring of the last rows; then the row above which nothing is missing
-any more adds up its forces, in the order of the reference path, and moves on the spot. Rows have a constant, padded
-length, so every loop is a vector without gathers, and the bits depend neither on the tiles nor on the threads.
+A tile of the grid is loaded with a halo into a scratch, [row][component][column], makes a few steps there, and its
+inner part is stored; tiles overlap by what the halo loses in these steps, and compute it twice. A step sweeps over the
+rows: each stencil is evaluated once for a whole row, into a ring of the last rows; then the row above which nothing is
+missing any more adds up its forces, in the order of the reference path, and moves on the spot. Rows have a constant,
+padded length, so every loop is a vector without gathers, and the bits depend neither on the tiles nor on the threads.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,12 +19,14 @@ from numpy.typing import NDArray
 from pointmass.engine import store
 from pointmass.engine.binding import Binder, Table
 from pointmass.engine.forces import unary
-from pointmass.engine.island import NOT_FINITE, Rows, Span
-from pointmass.engine.phases import STATE, entries, phases, regions, simple
-from pointmass.engine.printing import indented, literal
+from pointmass.engine.island import Array, Outcome, Rows, Span
+from pointmass.engine.phases import REACHED, STATE, entries, phases, regions, simple
+from pointmass.engine.printing import indented
+from pointmass.engine.threads import spread
 from pointmass.laws.elements import ElementForce
 from pointmass.laws.unary import UnaryForce
-from pointmass.solvers.base import Solver
+from pointmass.solvers.advance import Stats
+from pointmass.solvers.base import Memory, Solver
 from pointmass.system import ParticleSystem
 from pointmass.tracing.columns import expanded
 from pointmass.tracing.program import Program
@@ -36,6 +39,7 @@ WIDTHS = (64, 128, 256)  # columns of a tile
 HEIGHT = 64  # rows of a tile, at most
 STEPS = 4  # steps in one pass, at most
 TERMS = 48  # terms of a sum in one loop: LLVM compares no more than some 100 addresses before it gives up vectors
+GRAIN = 32  # rows that are worth a thread
 PAD = 8  # the halo has a multiple of so many columns
 
 
@@ -63,13 +67,14 @@ class Stencil:
 class Grid:
     """An island as a grid of m x n particles, row by row."""
 
+    members: Rows
     m: int
     n: int
     stencils: list[Stencil]
 
 
 def grid(system: ParticleSystem, members: Rows) -> Grid | None:
-    """The grid that an island is, if it is one."""
+    """The grid that an island is, if it is one; `members` are its particles, row by row."""
     place = np.full(len(system.particles), -1, np.intp)
     place[members] = np.arange(len(members))
     found = []
@@ -87,7 +92,7 @@ def grid(system: ParticleSystem, members: Rows) -> Grid | None:
         if m >= SMALLEST and m * n == len(members):
             stencils = _stencils(found, m, n)
             if stencils is not None:
-                return Grid(m, n, stencils)
+                return Grid(members, m, n, stencils)
     return None
 
 
@@ -184,9 +189,7 @@ class LatticeKernel:
     pad : columns of the halo on either side.
     """
 
-    def __init__(self, system: ParticleSystem, solver: Solver, members: Rows, first: NDArray[np.int64]) -> None:
-        found = grid(system, members)
-        assert found is not None
+    def __init__(self, system: ParticleSystem, solver: Solver, found: Grid) -> None:
         self.system, self.solver, self.grid = system, solver, found
         self.dtype = str(system.particles.dtype)
         self.phases = phases(solver, self.dtype, system.velocity_dependent)
@@ -206,17 +209,28 @@ class LatticeKernel:
         self.tables = [Columns(f"D{k}", self.row) for k in range(len(found.stencils))]
         self.slots = 0  # numbers of all stencils at one corner
         row = self._row()
-        self.text = "\n".join([*self._constants(), *row, *self._phases(), *self._tile(), *self._run()])
+        parts = ["\n".join(self._constants()), self.binder.functions, REACHED]
+        self.text = "".join([*parts, "\n".join([*row, *self._phases(), *self._tile(), *self._run()])])
 
     @staticmethod
-    def fits(system: ParticleSystem, solver: Solver, members: Rows, first: NDArray[np.int64]) -> bool:
-        """Whether an island can be advanced like this: undisturbed, a grid, by fixed steps, and all are born."""
-        return simple(system, solver) and len(first) == 2 and grid(system, members) is not None
+    def fits(system: ParticleSystem, solver: Solver) -> bool:
+        """Whether a grid can be advanced like this: undisturbed, by fixed steps. All must be born."""
+        return simple(system, solver)
 
+    @property
     def title(self) -> str:
         """What the kernel is, in a line."""
         forces = ", ".join(f.name for f in self.system.forces) or "no force"
         return f"grid of particles: {self.solver.name} under {forces}"
+
+    @cached_property
+    def functions(self) -> dict[str, Any]:
+        """By name; each is compiled when it is first called."""
+        return vars(store.load(self.title, self.text, self.dtype))
+
+    def members(self, found: Grid) -> LatticeMembers:
+        """A grid to be advanced."""
+        return LatticeMembers(self, found)
 
     def columns(self) -> list[Columns]:
         """Tables of all columns: of the particles, and of the elements of each stencil."""
@@ -261,7 +275,7 @@ class LatticeKernel:
             elif k < len(self.grid.stencils) and self.grid.stencils[k].force is force:
                 mine = [s for s in self.grid.stencils if s.force is force]
                 terms: list[tuple[int, str]] = []
-                for stencil in mine:
+                for _ in mine:
                     lines, at_time, own = self._stencil(k, f"f{number}")
                     elements += lines
                     timed += [line for line in at_time if line not in timed]
@@ -270,16 +284,22 @@ class LatticeKernel:
                 sums += [[line] for _, line in sorted(terms, key=lambda term: term[0])]
         return [
             "@njit(**FLAGS)",
-            f"def row(q, masks, {self._rings()}, f, P, t, r, m, whole):",
+            f"def row(q, masks, {self._rings()}, f, {self._shared()}, t, r, m, whole):",
             *indented(self.binder.numbers.lines(), 1),
             "    status = 0",
             *indented([*timed, *elements], 1),
             "    if whole:",
-            *indented([line for k in range(0, max(1, len(sums)), TERMS) for line in _sum(sums[k : k + TERMS], k == 0)], 2),
+            *indented(
+                [line for k in range(0, max(1, len(sums)), TERMS) for line in _sum(sums[k : k + TERMS], k == 0)], 2
+            ),
             "    return status",
             "",
             "",
         ]
+
+    def _shared(self) -> str:
+        """Arrays that all particles share: numbers and grids."""
+        return ", ".join(name for name in self.binder.arrays if name != self.binder.particle.name)
 
     def _rings(self) -> str:
         """Names of the forces of the elements with their corner in this row, in the one before, ..."""
@@ -355,7 +375,7 @@ class LatticeKernel:
                 "for r in range(lo, end):",
                 f"    q = s[HEAD + (r - top) * ROW : HEAD + (r - top + {self.reach + 1}) * ROW + WIDTH]",
                 *(f"    z{d} = s[RING + (r + {depth - d}) % {depth} * SLOT :][:SLOT]" for d in range(depth)),
-                f"    status |= row(q, masks, {self._rings()}, f, P, {phase.time}, r, m, r >= begin)",
+                f"    status |= row(q, masks, {self._rings()}, f, {self._shared()}, {phase.time}, r, m, r >= begin)",
                 "    if r >= begin:",
                 f"        phase{different.index(tuple(phase.lines))}(q, f, hr)",
                 "lo = begin",
@@ -373,7 +393,9 @@ class LatticeKernel:
             for q in STATE:
                 for a in AXES:
                     place = self.row.component(f"{q}0 {a}")
-                    load.append(f"bring(s, o + {place} * WIDTH, Y, ({3 * STATE.index(q) + AXES.index(a)} * m + r) * n, left, n)")
+                    load.append(
+                        f"bring(s, o + {place} * WIDTH, Y, ({3 * STATE.index(q) + AXES.index(a)} * m + r) * n, left, n)"
+                    )
         for table in self.columns():
             for column in range(len(table.getters)):
                 place = self.row.component(f"{table.name} {column}")
@@ -410,7 +432,7 @@ class LatticeKernel:
             "",
             "",
             "@njit(**FLAGS)",
-            "def tile(s, Y, Z, P, K, O, upper, lower, column, m, n, t0, dt, k, steps):",
+            f"def tile(s, Y, Z, {self._shared()}, K, O, upper, lower, column, m, n, t0, dt, k, steps):",
             "    left = column * INNER - PAD",
             f"    top = max(0, upper - {halo} * steps)",
             f"    bottom = min(m, lower + {halo} * steps)",
@@ -438,77 +460,71 @@ class LatticeKernel:
         ]
 
     def _run(self) -> list[str]:
+        shared = self._shared()
         return f'''@njit(parallel=True, **FLAGS)
-def sweep(Y, Z, work, P, K, O, height, m, n, t0, dt, k, steps, status):
+def sweep(Y, Z, work, {shared}, K, O, height, m, n, t0, dt, k, steps, status):
     wide = (n + INNER - 1) // INNER
     tiles = (m + height - 1) // height * wide
     for chunk in prange(len(work)):
         bad = 0
         for q in range(chunk * tiles // len(work), (chunk + 1) * tiles // len(work)):
             upper = q // wide * height
-            bad |= tile(work[chunk], Y, Z, P, K, O, upper, min(m, upper + height), q % wide, m, n, t0, dt, k, steps)
+            lower = min(m, upper + height)
+            bad |= tile(work[chunk], Y, Z, {shared}, K, O, upper, lower, q % wide, m, n, t0, dt, k, steps)
         status[chunk] |= bad
 
 
-@njit(parallel=True, **FLAGS)
-def apart(x, v, Y, m, n):
+@njit(**FLAGS)
+def apart(lo, hi, x, v, Y, m, n):
     """(x, y, z) of each particle to a row of each component."""
-    for r in prange(m):
+    for r in range(lo, hi):
         for c in range(n):
             for a in range(3):
                 Y[(a * m + r) * n + c] = x[3 * (r * n + c) + a]
                 Y[((3 + a) * m + r) * n + c] = v[3 * (r * n + c) + a]
 
 
-@njit(parallel=True, **FLAGS)
-def together(x, v, Y, m, n, finite):
-    """The way back; and the rows where a number is not finite."""
-    for r in prange(m):
-        z = R(0)
+@njit(**FLAGS)
+def together(lo, hi, x, v, Y, m, n, reach):
+    """The way back, and the largest size of a component in each row."""
+    for r in range(lo, hi):
         for c in range(n):
             for a in range(3):
                 x[3 * (r * n + c) + a] = Y[(a * m + r) * n + c]
                 v[3 * (r * n + c) + a] = Y[((3 + a) * m + r) * n + c]
-                z += (Y[(a * m + r) * n + c] + Y[((3 + a) * m + r) * n + c]) * R(0)
-        finite[r] = z == R(0)
-
+        reach[r, 0] = reached(x, 3 * r * n, 3 * (r + 1) * n)
+        reach[r, 1] = reached(v, 3 * r * n, 3 * (r + 1) * n)
 '''.split("\n")
 
 
-class LatticeGroup:
-    """An island that is a grid, in the order of the kernel."""
+class LatticeMembers:
+    """An island that is a grid."""
 
-    def __init__(self, kernel: LatticeKernel, members: Rows, first: NDArray[np.int64]) -> None:
-        self.kernel = kernel
-        found = grid(kernel.system, members)
-        assert found is not None
-        self.grid = found
-        self.orders = [members.reshape(found.m, found.n), *(s.own for s in found.stencils)]
+    def __init__(self, kernel: LatticeKernel, found: Grid) -> None:
+        self.kernel, self.grid = kernel, found
+        self.orders = [found.members.reshape(found.m, found.n), *(s.own for s in found.stencils)]
         size = 6 * found.m * found.n
         self._state = np.empty(size, kernel.dtype), np.empty(size, kernel.dtype)
         self._work: NDArray[Any] | None = None
         self._raw: list[NDArray[Any]] = []  # columns as they were, in the order of the system
         self._packed: tuple[NDArray[Any], NDArray[np.int64]] | None = None
 
-    def run(self, functions: Any, x: Any, v: Any, birth: Any, span: Span) -> NDArray[np.int64]:
-        """Advance positions and velocities, shape (3 * rows,), in place; status of the island."""
+    def run(self, x: Array, v: Array, births: Array | None, span: Span, memory: Memory) -> Outcome:
+        """Advance positions and velocities, shape (3 * rows,), in place."""
         kernel, m, n = self.kernel, self.grid.m, self.grid.n
+        apart, sweep, together = (kernel.functions[name] for name in ("apart", "sweep", "together"))
         height, work = self._tiles()
-        status, finite = np.zeros(len(work), np.int64), np.zeros(m, np.bool_)
+        status, reach = np.zeros(len(work), np.int64), np.zeros((m, 2), x.dtype)
         here, there = self._state
-        data = (work, kernel.binder.numbers.array(), *self._columns(), height, m, n, span.t0, span.dt)
-        functions["apart"](x, v, here, m, n)
+        data = (work, *kernel.binder.common(), *self._columns(), height, m, n, span.t0, span.dt)
+        spread(lambda lo, hi: apart(lo, hi, x, v, here, m, n), m, GRAIN)
         for k in range(span.first, span.first + span.count, kernel.most):
-            steps = min(kernel.most, span.first + span.count - k)
-            functions["sweep"](here, there, *data, k, steps, status)
+            sweep(here, there, *data, k, min(kernel.most, span.first + span.count - k), status)
             here, there = there, here
-        functions["together"](x, v, here, m, n, finite)
-        return np.array([np.bitwise_or.reduce(status) if finite.all() else NOT_FINITE])
-
-    def functions(self) -> dict[str, Any]:
-        """The kernel's functions, compiled when first called."""
-        kernel = self.kernel
-        return vars(store.load(kernel.title(), kernel.text, kernel.dtype))
+        spread(lambda lo, hi: together(lo, hi, x, v, here, m, n, reach), m, GRAIN)
+        far = reach.max(axis=0).astype(np.float64)
+        stats = Stats(span.count, 0, span.count * len(kernel.phases))
+        return Outcome(not status.any() and bool((far < np.inf).all()), far, stats)
 
     def _tiles(self) -> tuple[int, NDArray[Any]]:
         """Rows of a tile, so that all threads have as many, and the scratch of each. Bits do not depend on them."""

@@ -18,6 +18,24 @@ from pointmass.solvers.explicit import EmbeddedRungeKutta, ExplicitRungeKutta
 from pointmass.solvers.splitting import Splitting
 from pointmass.system import ParticleSystem
 
+REACHED = '''BITS = np.int32 if R is np.float32 else np.int64
+SIZE = BITS(np.iinfo(BITS).max)  # all bits but the sign
+
+
+@njit(**FLAGS)
+def reached(s, begin, end):
+    """Largest size of some numbers, with whole numbers, so that the loop is one of vectors: the bits of sizes are in
+    their order, and NaN is above all."""
+    bits = s.view(BITS)
+    most = BITS(0)
+    for i in range(begin, end):
+        most = max(most, bits[np.uintp(i)] & SIZE)
+    found = np.empty(1, BITS)
+    found[0] = most
+    return found.view(R)[0]
+
+
+'''
 STATE = ("X", "V")  # where the laws read position and velocity; before and after a step, the state itself
 
 

@@ -116,6 +116,6 @@ def _select(typingctx: Any, condition: Any, a: Any, b: Any) -> Any:
 @overload(select, inline="always")
 def _compiled_select(condition: Any, a: Any, b: Any) -> Any:
     def compiled(condition: Any, a: Any, b: Any) -> Any:
-        return _select(condition, a, b)
+        return _select(condition, a, b)  # type: ignore[call-arg]  # Numba gives the context
 
     return compiled
