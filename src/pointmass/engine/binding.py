@@ -127,10 +127,15 @@ class Binder:
 
     def data(self, length: int, order: NDArray[np.intp] | None) -> list[Any]:
         """The arrays now; columns have one entry for each row of the kernel."""
+        columns = self.particle.array(length, self.particles.dtype, order)
+        numbers, *grids = self.common()
+        return [numbers, columns, *grids]
+
+    def common(self) -> list[Any]:
+        """The arrays now without the columns."""
         dtype = self.particles.dtype
         grids = [(g.table(dtype).ravel(), grid_text.numbers(g, dtype), grid_text.shape(g)) for g in self._grids]
-        columns = self.particle.array(length, dtype, order)
-        return [self.numbers.array(), columns, *(array for each in grids for array in each)]
+        return [self.numbers.array(), *(array for each in grids for array in each)]
 
     @property
     def functions(self) -> str:

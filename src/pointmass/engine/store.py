@@ -29,7 +29,7 @@ Printed by pointmass {version} for {dtype}. It runs without Numba too: delete th
 import numpy as np
 from numba import njit, prange
 
-from pointmass.engine.support import exponent, scaled, significand
+from pointmass.engine.support import exponent, scaled, select, significand
 
 R = np.{dtype}
 FLAGS = {{"error_model": "numpy", "cache": True, "nogil": True{fast}}}

@@ -97,3 +97,25 @@ def exponent(a: Any) -> Any:
     special = wide == 0.0 or not abs(wide) < np.inf
     e = ((bits >> 52) & 0x7FF) - 1022 - (54 if tiny else 0)
     return type(a)(0 if special else e)
+
+
+def select(condition: Any, a: Any, b: Any) -> Any:
+    """`a` where the condition holds, else `b`: one instruction, never a branch, so that loops stay vectors."""
+    return a if condition else b
+
+
+@intrinsic
+def _select(typingctx: Any, condition: Any, a: Any, b: Any) -> Any:
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        condition, a, b = arguments
+        return builder.select(builder.trunc(condition, ir.IntType(1)) if condition.type.width > 1 else condition, a, b)
+
+    return a(types.boolean, a, a), build
+
+
+@overload(select, inline="always")
+def _compiled_select(condition: Any, a: Any, b: Any) -> Any:
+    def compiled(condition: Any, a: Any, b: Any) -> Any:
+        return _select(condition, a, b)  # type: ignore[call-arg]  # Numba gives the context
+
+    return compiled

@@ -1,0 +1,567 @@
+"""The fast path of one large island whose elements are shifts of a stencil on a row-major grid: cloth.
+
+A tile of the grid is loaded with a halo into a scratch, [row][component][column], makes a few steps there, and its
+inner part is stored; tiles overlap by what the halo loses in these steps, and compute it twice. A step sweeps over the
+rows: each stencil is evaluated once for a whole row, into a ring of the last rows; then the row above which nothing is
+missing any more adds up its forces, in the order of the reference path, and moves on the spot. Rows have a constant,
+padded length, so every loop is a vector without gathers, and the bits depend neither on the tiles nor on the threads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.engine import store
+from pointmass.engine.binding import Binder, Table
+from pointmass.engine.forces import unary
+from pointmass.engine.island import Array, Outcome, Rows, Span
+from pointmass.engine.phases import REACHED, STATE, entries, phases, regions, simple
+from pointmass.engine.printing import indented
+from pointmass.engine.threads import spread
+from pointmass.laws.elements import ElementForce
+from pointmass.laws.unary import UnaryForce
+from pointmass.solvers.advance import Stats
+from pointmass.solvers.base import Memory, Solver
+from pointmass.system import ParticleSystem
+from pointmass.tracing.columns import expanded
+from pointmass.tracing.program import Program
+from pointmass.tracing.trace import Traced, vector_names
+
+AXES = "xyz"
+FARTHEST = 4  # rows or columns between the nodes of an element
+SMALLEST = 16  # rows and columns of a grid that is worth tiles
+WIDTHS = (64, 128, 256)  # columns of a tile
+HEIGHT = 64  # rows of a tile, at most
+STEPS = 4  # steps in one pass, at most
+TERMS = 48  # terms of a sum in one loop: LLVM compares no more than some 100 addresses before it gives up vectors
+GRAIN = 32  # rows that are worth a thread
+PAD = 8  # the halo has a multiple of so many columns
+
+
+@dataclass(frozen=True, eq=False)
+class Stencil:
+    """Elements of a force that are shifts of each other over the whole grid.
+
+    Attributes
+    ----------
+    shifts : (row, column) of each node, seen from the corner of the element's box.
+    own : number in the force of the element at each corner, shape (m - rows, n - columns).
+    """
+
+    force: ElementForce
+    shifts: tuple[tuple[int, int], ...]
+    own: Rows
+
+    @property
+    def box(self) -> tuple[int, int]:
+        """Rows and columns between the first and the last node."""
+        return max(r for r, _ in self.shifts), max(c for _, c in self.shifts)
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """An island as a grid of m x n particles, row by row."""
+
+    members: Rows
+    m: int
+    n: int
+    stencils: list[Stencil]
+
+
+def grid(system: ParticleSystem, members: Rows) -> Grid | None:
+    """The grid that an island is, if it is one; `members` are its particles, row by row."""
+    place = np.full(len(system.particles), -1, np.intp)
+    place[members] = np.arange(len(members))
+    found = []
+    for force in system.forces:
+        if isinstance(force, ElementForce) and force.enabled:
+            rows = force.rows(system.particles)
+            mine = np.flatnonzero(place[rows[:, 0]] >= 0)
+            found.append((force, place[rows[mine]], mine))
+    distances = [np.unique(abs(nodes[:, 1:] - nodes[:, :1])) for _, nodes, _ in found if len(nodes)]
+    if not distances or max(map(len, distances)) > 4 * FARTHEST**2:
+        return None
+    near = {(int(d) + k) // r for d in np.concatenate(distances) for k in (-1, 0, 1) for r in range(1, FARTHEST + 1)}
+    for n in sorted(near):
+        m = len(members) // n if n >= SMALLEST else 0
+        if m >= SMALLEST and m * n == len(members):
+            stencils = _stencils(found, m, n)
+            if stencils is not None:
+                return Grid(members, m, n, stencils)
+    return None
+
+
+def _stencils(found: list[tuple[ElementForce, Rows, Rows]], m: int, n: int) -> list[Stencil] | None:
+    """The elements as stencils that cover the whole of a grid of a given width; None if they do not."""
+    result = []
+    for force, nodes, own in found:
+        rows, columns = nodes // n, nodes % n
+        top, left = rows.min(axis=1), columns.min(axis=1)
+        shifts = np.stack([rows - top[:, None], columns - left[:, None]], axis=2)
+        if shifts.max(initial=0) > FARTHEST:
+            return None
+        kinds, which = np.unique(shifts.reshape(len(nodes), -1), axis=0, return_inverse=True)
+        for k, kind in enumerate(kinds):
+            stencil = tuple((int(r), int(c)) for r, c in kind.reshape(-1, 2))
+            box = np.max(stencil, axis=0)
+            mine = np.flatnonzero(which.ravel() == k)
+            corners = np.full((m - box[0], n - box[1]), -1, np.intp)
+            corners[top[mine], left[mine]] = own[mine]
+            if len(mine) != corners.size or (corners < 0).any():
+                return None
+            result.append(Stencil(force, stencil, corners))
+    return result
+
+
+@dataclass
+class Row:
+    """The components of a row of the scratch."""
+
+    places: dict[str, int] = field(default_factory=dict)
+
+    def component(self, name: str) -> int:
+        """Number of a component; one with a new name is added."""
+        return self.places.setdefault(name, len(self.places))
+
+
+class Columns(Table):
+    """Columns of the particles, or of a stencil's elements at their corners, as components of a row."""
+
+    def __init__(self, name: str, row: Row) -> None:
+        super().__init__(name)
+        self.row = row
+
+    def entry(self, column: int, index: str) -> str:
+        return _entry(self.row.component(f"{self.name} {column}"))
+
+
+def _entry(component: int, rows: int = 0, columns: int = 0) -> str:
+    """A number of lane `i` in the row `q`, or of a lane at a distance."""
+    far = f"{rows} * ROW + " * (rows > 0) + f"{component} * WIDTH" + f" + {columns}" * (columns > 0)
+    return f"q[{far} + i]"
+
+
+def _sum(terms: list[list[str]], fresh: bool) -> list[str]:
+    """A loop that adds up forces on the particles of a row."""
+    return [
+        "for i in range(WIDTH):",
+        *indented([f"f_{a} = {'R(0)' if fresh else f'f[{k} * WIDTH + i]'}" for k, a in enumerate(AXES)], 1),
+        *indented([line for term in terms for line in term], 1),
+        *indented([f"f[{k} * WIDTH + i] = f_{a}" for k, a in enumerate(AXES)], 1),
+    ]
+
+
+def _bases(traced: Traced) -> tuple[Traced, list[tuple[int, str] | None]]:
+    """A law without the outputs that are another one with the other sign.
+
+    Returns
+    -------
+    law : its outputs are the forces that are different.
+    terms : number and sign of the one that each output of the law is; None for 0.
+    """
+    program = expanded(traced.program)
+    found: dict[int, int] = {}
+    terms: list[tuple[int, str] | None] = []
+    for node in program.outputs:
+        op, *rest = program.nodes[node]
+        if op == "const" and rest[0] == 0:
+            terms.append(None)
+        else:
+            base = rest[0] if op == "neg" else node
+            terms.append((found.setdefault(base, len(found)), "-" if op == "neg" else "+"))
+    return Traced(traced.name, traced.inputs, Program(program.nodes, list(found))), terms
+
+
+class LatticeKernel:
+    """Advances an island that is a grid.
+
+    Forces on elements that are switched off are left out, so another kernel is needed when they are switched on. The
+    number of rows is data; columns count in steps of `WIDTHS`.
+
+    Attributes
+    ----------
+    most : steps in one pass.
+    pad : columns of the halo on either side.
+    """
+
+    def __init__(self, system: ParticleSystem, solver: Solver, found: Grid) -> None:
+        self.system, self.solver, self.grid = system, solver, found
+        self.dtype = str(system.particles.dtype)
+        self.phases = phases(solver, self.dtype, system.velocity_dependent)
+        boxes = [s.box for s in found.stencils]
+        self.reach = max(r for r, _ in boxes)
+        lost = max(1, max(c for _, c in boxes) * len(self.phases))  # columns that a step takes from the halo
+        self.most = max(1, min(STEPS, PAD // lost))
+        self.pad = -(-lost * self.most // PAD) * PAD
+        self.width = min(WIDTHS, key=lambda w: (-(-found.n // w) * (w + 2 * self.pad), w))
+        self.masks = sorted({c for _, c in boxes})
+        self.row = Row()
+        self.state = [self.row.component(f"{name} {a}") for name in STATE for a in AXES]
+        for name in regions(self.phases):
+            for a in AXES:
+                self.row.component(f"{name} {a}")
+        self.binder = Binder(system.particles, Columns("C", self.row))
+        self.tables = [Columns(f"D{k}", self.row) for k in range(len(found.stencils))]
+        self.slots = 0  # numbers of all stencils at one corner
+        row = self._row()
+        parts = ["\n".join(self._constants()), self.binder.functions, REACHED]
+        self.text = "".join([*parts, "\n".join([*row, *self._phases(), *self._tile(), *self._run()])])
+
+    @staticmethod
+    def fits(system: ParticleSystem, solver: Solver) -> bool:
+        """Whether a grid can be advanced like this: undisturbed, by fixed steps. All must be born."""
+        return simple(system, solver)
+
+    @property
+    def title(self) -> str:
+        """What the kernel is, in a line."""
+        forces = ", ".join(f.name for f in self.system.forces) or "no force"
+        return f"grid of particles: {self.solver.name} under {forces}"
+
+    @cached_property
+    def functions(self) -> dict[str, Any]:
+        """By name; each is compiled when it is first called."""
+        return vars(store.load(self.title, self.text, self.dtype))
+
+    def members(self, found: Grid) -> LatticeMembers:
+        """A grid to be advanced."""
+        return LatticeMembers(self, found)
+
+    def columns(self) -> list[Columns]:
+        """Tables of all columns: of the particles, and of the elements of each stencil."""
+        particle = self.binder.particle
+        assert isinstance(particle, Columns)
+        return [particle, *self.tables]
+
+    def scratch(self, rows: int) -> int:
+        """How many numbers the scratch of a tile needs."""
+        width = self.width + 2 * self.pad
+        head = 3 + len(self.masks) + (self.reach + 1) * (self.slots + 1)
+        return width * (head + (rows + self.reach + 1) * len(self.row.places))
+
+    # ---------------------------------------------------------------------------------------- text
+
+    def _constants(self) -> list[str]:
+        return [
+            f"WIDTH = {self.width + 2 * self.pad}",
+            f"PAD = {self.pad}",
+            f"INNER = {self.width}",
+            f"ROW = {len(self.row.places)} * WIDTH",
+            "MASKS = 3 * WIDTH",  # behind the forces on a row
+            f"RING = MASKS + {len(self.masks)} * WIDTH",
+            f"SLOT = {self.slots + 1} * WIDTH",
+            f"HEAD = RING + {self.reach + 1} * SLOT",
+            "",
+            "",
+        ]
+
+    def _row(self) -> list[str]:
+        """The function that evaluates all elements whose corner is in a row, and adds up the forces on that row."""
+        elements: list[str] = []
+        sums: list[list[str]] = []
+        timed: list[str] = []
+        k = 0
+        for number, force in enumerate(self.system.forces):
+            if isinstance(force, UnaryForce):
+                state = {n: self._state(q, a) for q in STATE for a, n in enumerate(vector_names(q.lower()))}
+                at_time, lines = unary(self.binder, force, f"f{number}", state, "")
+                timed += at_time
+                sums.append(lines)
+            elif k < len(self.grid.stencils) and self.grid.stencils[k].force is force:
+                mine = [s for s in self.grid.stencils if s.force is force]
+                terms: list[tuple[int, str]] = []
+                for _ in mine:
+                    lines, at_time, own = self._stencil(k, f"f{number}")
+                    elements += lines
+                    timed += [line for line in at_time if line not in timed]
+                    terms += own
+                    k += 1
+                sums += [[line] for _, line in sorted(terms, key=lambda term: term[0])]
+        return [
+            "@njit(**FLAGS)",
+            f"def row(q, masks, {self._rings()}, f, {self._shared()}, t, r, m, whole):",
+            *indented(self.binder.numbers.lines(), 1),
+            "    status = 0",
+            *indented([*timed, *elements], 1),
+            "    if whole:",
+            *indented(
+                [line for k in range(0, max(1, len(sums)), TERMS) for line in _sum(sums[k : k + TERMS], k == 0)], 2
+            ),
+            "    return status",
+            "",
+            "",
+        ]
+
+    def _shared(self) -> str:
+        """Arrays that all particles share: numbers and grids."""
+        return ", ".join(name for name in self.binder.arrays if name != self.binder.particle.name)
+
+    def _rings(self) -> str:
+        """Names of the forces of the elements with their corner in this row, in the one before, ..."""
+        return ", ".join(f"z{d}" for d in range(self.reach + 1))
+
+    def _state(self, region: str, axis: int, shift: tuple[int, int] = (0, 0)) -> str:
+        return _entry(self.row.component(f"{region} {AXES[axis]}"), *shift)
+
+    def _stencil(self, k: int, tag: str) -> tuple[list[str], list[str], list[tuple[int, str]]]:
+        """A stencil for a row of corners.
+
+        Returns
+        -------
+        lines, at_time : statements of the row, and of the time.
+        terms : what it adds to the forces on a particle, each with the number of its element in the order of the force.
+        """
+        stencil, slot = self.grid.stencils[k], self.slots
+        force = stencil.force
+        law, outputs = _bases(force.traced)
+        self.slots += len(law.program.outputs)
+        state = {"t": "R(t)"}
+        for b, shift in enumerate(stencil.shifts):
+            for q in STATE:
+                names = vector_names(f"{q.lower()}{b + 1}")
+                state |= {n: self._state(q, a, shift) for a, n in enumerate(names)}
+        text = self.binder.law(law, force, state, "", self.tables[k], tag)
+        rows, columns = stencil.box
+        ring = [f"z0[{slot + o} * WIDTH + PAD + i]" for o in range(len(text.outputs))]
+        inside = f"inside = masks[{self.masks.index(columns)} * WIDTH + i] != R(0)"
+        lines = [
+            f"if r < m - {rows}:",
+            "    for i in range(WIDTH):",
+            *indented([inside, *text.lines], 2),
+            *(f"        {e} = select(inside, {o}, R(0))" for e, o in zip(ring, text.outputs, strict=True)),
+            "else:",
+            "    for i in range(WIDTH):",
+            *(f"        {e} = R(0)" for e in ring),
+        ]
+        terms = []
+        for b, (dr, dc) in enumerate(stencil.shifts):
+            middle = stencil.own[(stencil.own.shape[0] + rows) // 2 - dr, (stencil.own.shape[1] + columns) // 2 - dc]
+            for a, term in zip(AXES, outputs[3 * b : 3 * b + 3], strict=True):
+                if term is not None:
+                    entry = f"z{dr}[{slot + term[0]} * WIDTH + PAD - {dc} + i]"
+                    terms.append((int(middle), f"f_{a} = f_{a} {term[1]} {entry}"))
+        return lines, text.at_time, terms
+
+    def _phases(self) -> list[str]:
+        """The functions of the phases for a row."""
+        different = list(dict.fromkeys(tuple(p.lines) for p in self.phases))
+        lines = []
+        for number, phase in enumerate(different):
+            lines += ["@njit(**FLAGS)", f"def phase{number}(q, f, hr):", "    for i in range(WIDTH):"]
+            lines += [f"        w = {self.binder.attribute('w', '')}", "        free = w != R(0)"]
+            for a in range(3):
+                places = {r: self._state(r, a) for r in regions(self.phases)}
+                lines.append(f"        a = select(free, f[{a} * WIDTH + i] * w, R(0))")
+                lines += indented(entries(phase, places), 2)
+            lines += ["", ""]
+        return lines
+
+    def _sweeps(self) -> list[str]:
+        """Statements of a step: a sweep over the rows for each phase."""
+        different = list(dict.fromkeys(tuple(p.lines) for p in self.phases))
+        depth = self.reach + 1
+        lines = []
+        for phase in self.phases:
+            lines += [
+                "for i in range(RING, HEAD):",
+                "    s[i] = R(0)",
+                f"begin = lo + {self.reach} if lo > 0 else 0",
+                f"end = hi - {self.reach} if hi < m else m",
+                "for r in range(lo, end):",
+                f"    q = s[HEAD + (r - top) * ROW : HEAD + (r - top + {self.reach + 1}) * ROW + WIDTH]",
+                *(f"    z{d} = s[RING + (r + {depth - d}) % {depth} * SLOT :][:SLOT]" for d in range(depth)),
+                f"    status |= row(q, masks, {self._rings()}, f, {self._shared()}, {phase.time}, r, m, r >= begin)",
+                "    if r >= begin:",
+                f"        phase{different.index(tuple(phase.lines))}(q, f, hr)",
+                "lo = begin",
+                "hi = end",
+            ]
+        return lines
+
+    def _tile(self) -> list[str]:
+        """The function that takes the particles of one tile through a few steps."""
+        halo = self.reach * len(self.phases)
+        load, fill, c = [], [], 0
+        for j, place in enumerate(self.state):
+            load.append(f"bring(s, o + {place} * WIDTH, Y, ({j} * m + r) * n, left, n)")
+        if "X0 x" in self.row.places:
+            for q in STATE:
+                for a in AXES:
+                    place = self.row.component(f"{q}0 {a}")
+                    load.append(
+                        f"bring(s, o + {place} * WIDTH, Y, ({3 * STATE.index(q) + AXES.index(a)} * m + r) * n, left, n)"
+                    )
+        for table in self.columns():
+            for column in range(len(table.getters)):
+                place = self.row.component(f"{table.name} {column}")
+                fill.append(f"bring(s, o + {place} * WIDTH, K, O[{2 * c}] + r * O[{2 * c + 1}], left, n)")
+                c += 1
+        masks = []
+        for k, columns in enumerate(self.masks):
+            masks.append(f"masks[{k} * WIDTH + i] = R(1) if left + i >= 0 and left + i < n - {columns} else R(0)")
+        keep = [
+            f"keep(s, o + {place} * WIDTH + PAD, Z, ({j} * m + r) * n + left + PAD, min(INNER, n - left - PAD))"
+            for j, place in enumerate(self.state)
+        ]
+        return [
+            "@njit(**FLAGS)",
+            "def bring(s, offset, Y, row, left, n):",
+            "    begin = max(0, -left)",
+            "    end = min(WIDTH, n - left)",
+            "    for i in range(begin):",
+            "        s[offset + i] = R(0)",
+            "    o = np.uintp(offset + begin)",
+            "    y = np.uintp(row + left + begin)",
+            "    for i in range(end - begin):",
+            "        s[o + np.uintp(i)] = Y[y + np.uintp(i)]",
+            "    for i in range(end, WIDTH):",
+            "        s[offset + i] = R(0)",
+            "",
+            "",
+            "@njit(**FLAGS)",
+            "def keep(s, offset, Z, row, count):",
+            "    o = np.uintp(offset)",
+            "    z = np.uintp(row)",
+            "    for i in range(count):",
+            "        Z[z + np.uintp(i)] = s[o + np.uintp(i)]",
+            "",
+            "",
+            "@njit(**FLAGS)",
+            f"def tile(s, Y, Z, {self._shared()}, K, O, upper, lower, column, m, n, t0, dt, k, steps):",
+            "    left = column * INNER - PAD",
+            f"    top = max(0, upper - {halo} * steps)",
+            f"    bottom = min(m, lower + {halo} * steps)",
+            "    f = s[:MASKS]",
+            "    masks = s[MASKS:RING]",
+            "    for i in range(WIDTH):",
+            *indented(masks, 2),
+            "    for r in range(top, bottom):",
+            "        o = HEAD + (r - top) * ROW",
+            *indented([*load, *fill], 2),
+            "    lo = top",
+            "    hi = bottom",
+            "    status = 0",
+            "    for now in range(k, k + steps):",
+            "        t = t0 + now * dt",
+            "        h = t0 + (now + 1) * dt - t",
+            "        hr = R(h)",
+            *indented(self._sweeps(), 2),
+            "    for r in range(upper, lower):",
+            "        o = HEAD + (r - top) * ROW",
+            *indented(keep, 2),
+            "    return status",
+            "",
+            "",
+        ]
+
+    def _run(self) -> list[str]:
+        shared = self._shared()
+        return f'''@njit(parallel=True, **FLAGS)
+def sweep(Y, Z, work, {shared}, K, O, height, m, n, t0, dt, k, steps, status):
+    wide = (n + INNER - 1) // INNER
+    tiles = (m + height - 1) // height * wide
+    for chunk in prange(len(work)):
+        bad = 0
+        for q in range(chunk * tiles // len(work), (chunk + 1) * tiles // len(work)):
+            upper = q // wide * height
+            lower = min(m, upper + height)
+            bad |= tile(work[chunk], Y, Z, {shared}, K, O, upper, lower, q % wide, m, n, t0, dt, k, steps)
+        status[chunk] |= bad
+
+
+@njit(**FLAGS)
+def apart(lo, hi, x, v, Y, m, n):
+    """(x, y, z) of each particle to a row of each component."""
+    for r in range(lo, hi):
+        for c in range(n):
+            for a in range(3):
+                Y[(a * m + r) * n + c] = x[3 * (r * n + c) + a]
+                Y[((3 + a) * m + r) * n + c] = v[3 * (r * n + c) + a]
+
+
+@njit(**FLAGS)
+def together(lo, hi, x, v, Y, m, n, reach):
+    """The way back, and the largest size of a component in each row."""
+    for r in range(lo, hi):
+        for c in range(n):
+            for a in range(3):
+                x[3 * (r * n + c) + a] = Y[(a * m + r) * n + c]
+                v[3 * (r * n + c) + a] = Y[((3 + a) * m + r) * n + c]
+        reach[r, 0] = reached(x, 3 * r * n, 3 * (r + 1) * n)
+        reach[r, 1] = reached(v, 3 * r * n, 3 * (r + 1) * n)
+'''.split("\n")
+
+
+class LatticeMembers:
+    """An island that is a grid."""
+
+    def __init__(self, kernel: LatticeKernel, found: Grid) -> None:
+        self.kernel, self.grid = kernel, found
+        self.orders = [found.members.reshape(found.m, found.n), *(s.own for s in found.stencils)]
+        size = 6 * found.m * found.n
+        self._state = np.empty(size, kernel.dtype), np.empty(size, kernel.dtype)
+        self._work: NDArray[Any] | None = None
+        self._raw: list[NDArray[Any]] = []  # columns as they were, in the order of the system
+        self._packed: tuple[NDArray[Any], NDArray[np.int64]] | None = None
+
+    def run(self, x: Array, v: Array, births: Array | None, span: Span, memory: Memory) -> Outcome:
+        """Advance positions and velocities, shape (3 * rows,), in place."""
+        kernel, m, n = self.kernel, self.grid.m, self.grid.n
+        apart, sweep, together = (kernel.functions[name] for name in ("apart", "sweep", "together"))
+        height, work = self._tiles()
+        status, reach = np.zeros(len(work), np.int64), np.zeros((m, 2), x.dtype)
+        here, there = self._state
+        data = (work, *kernel.binder.common(), *self._columns(), height, m, n, span.t0, span.dt)
+        spread(lambda lo, hi: apart(lo, hi, x, v, here, m, n), m, GRAIN)
+        for k in range(span.first, span.first + span.count, kernel.most):
+            sweep(here, there, *data, k, min(kernel.most, span.first + span.count - k), status)
+            here, there = there, here
+        spread(lambda lo, hi: together(lo, hi, x, v, here, m, n, reach), m, GRAIN)
+        far = reach.max(axis=0).astype(np.float64)
+        stats = Stats(span.count, 0, span.count * len(kernel.phases))
+        return Outcome(not status.any() and bool((far < np.inf).all()), far, stats)
+
+    def _tiles(self) -> tuple[int, NDArray[Any]]:
+        """Rows of a tile, so that all threads have as many, and the scratch of each. Bits do not depend on them."""
+        import numba
+
+        kernel, threads = self.kernel, numba.get_num_threads()
+        wide = -(-self.grid.n // kernel.width)
+        bands = -(-self.grid.m // HEIGHT)
+        while bands * wide % threads and bands < self.grid.m // SMALLEST:
+            bands += 1
+        height = -(-self.grid.m // bands)
+        size = kernel.scratch(height + 2 * kernel.reach * len(kernel.phases) * kernel.most)
+        if self._work is None or self._work.shape != (threads, size):
+            self._work = np.zeros((threads, size), kernel.dtype)
+        return height, self._work
+
+    def _columns(self) -> tuple[NDArray[Any], NDArray[np.int64]]:
+        """All columns by rows of the grid, and where each begins and how far its next row is: 0 if all are equal."""
+        tables = self.kernel.columns()
+        raw = [get() for table in tables for get in table.getters]
+        same = len(raw) == len(self._raw) and all(map(np.array_equal, raw, self._raw))
+        if self._packed is None or not same:
+            orders = [order for table, order in zip(tables, self.orders, strict=True) for _ in table.getters]
+            self._raw = [column.copy() for column in raw]
+            self._packed = self._rows(raw, orders)
+        return self._packed
+
+    def _rows(self, raw: list[NDArray[Any]], orders: list[Rows]) -> tuple[NDArray[Any], NDArray[np.int64]]:
+        m, n = self.grid.m, self.grid.n
+        parts, where, begin = [], [], 0
+        for column, order in zip(raw, orders, strict=True):
+            values = column[order].astype(self.kernel.dtype)
+            common = bool((values == values[0, 0]).all())
+            full = np.full((1 if common else m, n), values[0, 0], values.dtype)
+            if not common:
+                full[: values.shape[0], : values.shape[1]] = values
+            parts.append(full.ravel())
+            where += [begin, 0 if common else n]
+            begin += full.size
+        return np.concatenate(parts), np.array(where, np.int64)
