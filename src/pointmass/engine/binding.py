@@ -23,6 +23,7 @@ from pointmass.tracing.program import Primitive
 from pointmass.tracing.trace import Traced, vector_names
 
 Array = NDArray[np.floating[Any]]
+GRID = ("values", "numbers", "shape")  # arrays of a grid
 OUT_OF_BOUNDS = 2  # status of an island: a function of time is not allowed at some time
 
 
@@ -123,7 +124,7 @@ class Binder:
     @property
     def arrays(self) -> list[str]:
         """Names of the arrays that the laws read, in order: numbers, columns, and three for each grid."""
-        return ["P", self.particle.name, *(f"{name}{k}" for k in range(len(self._grids)) for name in "GHN")]
+        return ["P", self.particle.name, *(f"grid{k}_{what}" for k in range(len(self._grids)) for what in GRID)]
 
     def data(self, length: int, order: NDArray[np.intp] | None) -> list[Any]:
         """The arrays now; columns have one entry for each row of the kernel."""
@@ -151,7 +152,7 @@ class Binder:
         if primitive.grid not in self._grids:
             self._grids.append(primitive.grid)
         k = self._grids.index(primitive.grid)
-        return f"look{self._lookups.index(primitive)}({', '.join([*parts, f'G{k}', f'H{k}', f'N{k}'])})"
+        return f"look{self._lookups.index(primitive)}({', '.join([*parts, *(f'grid{k}_{what}' for what in GRID)])})"
 
     def attribute(self, name: str, index: str) -> str:
         """A column of the particles."""

@@ -21,6 +21,7 @@ from pointmass.engine.singles import SinglesKernel
 from pointmass.engine.threads import spread
 from pointmass.errors import InvalidInput
 from pointmass.laws.elements import ElementForce
+from pointmass.laws.pairs import PairForce
 from pointmass.laws.unary import UnaryForce
 from pointmass.particles import Array
 from pointmass.solvers.advance import Stats
@@ -33,6 +34,7 @@ from pointmass.system import ParticleSystem
 Rows = NDArray[np.intp]
 GRAIN = 2**16  # rows that are worth a thread
 LARGE = 4096  # particles of an island that is worth all threads
+LARGE_IN_PAIRS = 512  # the same, where pairs of them act
 WORK = 1e9  # particle-steps between two returns to Python: so long Ctrl-C waits
 LONGEST = 256  # steps of a span
 
@@ -97,7 +99,7 @@ class Engine:
         """What of the system has no kernel."""
         system = self.system
         return [
-            *(force.name for force in system.forces if not isinstance(force, (UnaryForce, ElementForce))),
+            *(force.name for force in system.forces if not isinstance(force, (UnaryForce, ElementForce, PairForce))),
             *([] if _has_step(self.solver) else [self.solver.name]),
         ]
 
@@ -165,8 +167,12 @@ class Engine:
         for group in self._grouped(births, span.start):
             x, v = _taken(p.x, group.rows), _taken(p.v, group.rows)
             clock = births if births is None or group.rows is None else births[group.rows]
-            outcomes.append(group.members.run(x, v, clock, span, memory))
-            if not outcomes[-1].good:
+            outcome = group.members.run(x, v, clock, span, memory)
+            while outcome.again:
+                x, v = self._again(group)
+                outcome = group.members.run(x, v, clock, span, memory)
+            outcomes.append(outcome)
+            if not outcome.good:
                 return False
             if group.rows is not None:
                 p.x[group.rows], p.v[group.rows] = x.reshape(-1, 3), v.reshape(-1, 3)
@@ -176,6 +182,14 @@ class Engine:
         self.system.t = span.end
         self.reference.remember(memory, work)
         return True
+
+    def _again(self, group: Group) -> tuple[Array, Array]:
+        """Positions and velocities of a group as they were before the span."""
+        assert self._before is not None
+        p = self.system.particles
+        rows = slice(None) if group.rows is None else group.rows
+        p.x[rows], p.v[rows] = self._before[0][rows], self._before[1][rows]
+        return _taken(p.x, group.rows), _taken(p.v, group.rows)
 
     def state_at(self, t: float) -> Array:
         """State of the present particles at a time within the last step, shape (dim,); nothing is changed.
@@ -215,11 +229,12 @@ class Engine:
         return self._groups[1]
 
     def _made_groups(self, islands: Rows, newborn: NDArray[np.bool_] | None) -> list[Group]:
-        size = np.bincount(islands)[islands]
+        system, size = self.system, np.bincount(islands)[islands]
         alone = (size == 1) & (control_of(self.solver) is None)
         births = newborn is not None
         groups = [self._group(SinglesKernel, np.flatnonzero(alone), islands, births)] if alone.any() else []
-        large = size >= LARGE
+        pairs = any(isinstance(force, PairForce) and force.enabled for force in system.forces)
+        large = size >= (LARGE_IN_PAIRS if pairs else LARGE)
         for island in np.unique(islands[large]):
             groups.append(self._group(IslandKernel, np.flatnonzero(islands == island), islands, True))
         others = np.flatnonzero(~alone & ~large)

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 
 from pointmass.engine.binding import Binder, Table, Text
 from pointmass.engine.contact import ContactText
+from pointmass.engine.pairs import Pairs
 from pointmass.engine.printing import indented, literal
 from pointmass.engine.reference import surfaces_of
 from pointmass.laws.elements import ElementForce
+from pointmass.laws.pairs import PairForce
 from pointmass.laws.unary import UnaryForce
 from pointmass.system import ParticleSystem
 from pointmass.tracing.trace import vector_names
@@ -56,6 +58,7 @@ class Deriv:
     ----------
     text : the function.
     families : of elements, in the order of the forces.
+    pairs : forces between all particles, or those within a cut-off.
     contact : what the colliders do to a particle, if there are any.
 
     Parameters
@@ -76,6 +79,7 @@ class Deriv:
         self.order = system.order
         self.binder = binder or Binder(system.particles, Table("C"))
         self.families: list[Elements] = []
+        self.pairs: list[Pairs] = []
         self.loop = "prange" if parallel else "range"
         self.flags = "parallel=True, **FLAGS" if parallel else "**FLAGS"
         self._at_time: list[str] = []
@@ -84,13 +88,13 @@ class Deriv:
     @property
     def data(self) -> list[str]:
         """Names of the arrays of a kernel that are the same for all islands."""
-        arrays = [*self.binder.arrays, *(a for family in self.families for a in family.arguments)]
+        arrays = [*self.binder.arrays, *(a for f in (*self.families, *self.pairs) for a in f.arguments)]
         return arrays if self.contact is None else [*arrays, "F"]
 
     @property
     def call(self) -> str:
         """The arguments of a call that all islands' calls share, as text."""
-        own = [a for f in self.families for a in f.locals] + ["K"] * (self.contact is not None)
+        own = [a for f in (*self.families, *self.pairs) for a in f.locals] + ["K"] * (self.contact is not None)
         return ", ".join(["base", "n", *self.data, *own])
 
     def _printed(self) -> str:
@@ -102,6 +106,10 @@ class Deriv:
                 sums += lines
             elif isinstance(force, ElementForce) and not self.alone:
                 evaluate, gather = self._elements(force, f"f{k}")
+                elements += evaluate
+                sums += gather
+            elif isinstance(force, PairForce) and not self.alone:
+                evaluate, gather = self._pairs(force)
                 elements += evaluate
                 sums += gather
         w = self.binder.attribute("w", "g")
@@ -133,7 +141,17 @@ class Deriv:
             "",
         ]
         contact = "" if self.contact is None else self.contact.text
-        return contact + self.binder.functions + "\n".join(lines)
+        pairs = "".join(f"{p.text}\n\n" for p in self.pairs)
+        return contact + self.binder.functions + pairs + "\n".join(lines)
+
+    def _pairs(self, force: PairForce) -> tuple[list[str], list[str]]:
+        """Statements that evaluate all pairs, and those that add what they do to a particle."""
+        pairs = Pairs(force, len(self.families) + len(self.pairs), self.binder, self.loop == "prange")
+        self.pairs.append(pairs)
+        j, switch = pairs.number, self.binder.switch(force)
+        evaluate = [f"# {force.name}", f"if {switch} != 0 and e{j} > s{j}:", f"    status |= {pairs.call()}"]
+        gather = [f"if {switch} != 0:", *(f"    f_{a} = f_{a} + F{j}[3 * g + {k}]" for k, a in enumerate("xyz"))]
+        return evaluate, gather
 
     def _bear(self) -> list[str]:
         """Resting contact: a filter on the sum of all forces, between calculate and gather."""
@@ -150,7 +168,7 @@ class Deriv:
 
     def _elements(self, force: ElementForce, tag: str) -> tuple[list[str], list[str]]:
         """Statements that evaluate elements into their buffer, and those that add them up on a particle."""
-        j, nodes = len(self.families), force.nodes
+        j, nodes = len(self.families) + len(self.pairs), force.nodes
         table = Table(f"D{j}")
         self.families.append(Elements(force, j, table))
         state = {"t": "R(t)"}

@@ -18,6 +18,7 @@ from pointmass.engine.adaptive import control_text
 from pointmass.engine.binding import Binder
 from pointmass.engine.forces import Deriv, Incidence, incidence
 from pointmass.engine.impacts import WORK, Impacts
+from pointmass.engine.pairs import FULL, PairArrays
 from pointmass.engine.printing import indented
 from pointmass.engine.steps import StepText, step_text
 from pointmass.engine.threads import spread
@@ -26,6 +27,7 @@ from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.control import control_of
 from pointmass.system import ParticleSystem
 
+CHECKPOINT = 64  # steps after which nothing is remembered of earlier ones but the state, so that a run can go on there
 GRAIN = 256  # particles that are worth a thread
 NOT_FINITE, NO_STEP = 1, 4  # bits of the status of an island
 
@@ -79,11 +81,13 @@ class Outcome:
     ----------
     good : whether nothing went wrong.
     reach : largest |x| [m] and |v| [m/s] of a component.
+    again : whether it had too little room, and has enough for another try now.
     """
 
     good: bool
     reach: Array
     stats: Stats
+    again: bool = False
 
 
 class IslandKernel:
@@ -137,7 +141,8 @@ class IslandKernel:
     def scratch(self) -> list[str]:
         """Statements that make what an island needs; M has the largest counts of particles and of elements."""
         contact = self.deriv.contact
-        lines = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{f.number + 1}], R)" for f in self.deriv.families]
+        families = enumerate(self.deriv.families)
+        lines = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{k + 1}], R)" for k, f in families]
         lines += [f"{name} = np.empty(3 * M[0], R)" for name in self.work]
         if contact is not None:
             lines.append(f"K = np.zeros({contact.record} * M[0])")
@@ -256,8 +261,10 @@ class IslandKernel:
     def _run(self) -> str:
         """The kernel itself: the islands of a group over a span."""
         deriv = self.deriv
-        ranges = [f"s{f.number} = S{f.number}[island]" for f in deriv.families]
-        ranges += [f"e{f.number} = S{f.number}[island + 1]" for f in deriv.families]
+        numbers = [f.number for f in (*deriv.families, *deriv.pairs)]
+        ranges = [line for j in numbers for line in (f"s{j} = S{j}[island]", f"e{j} = S{j}[island + 1]")]
+        lists = [f"K{p.number}[0] = 0" for p in deriv.pairs if p.near]
+        anew = [f"if (k0 + s) % {CHECKPOINT} == 0:", *indented(lists, 1)] if lists else []
         call = self.call.replace(", x, v, ", ", xi, vi, ")
         island = [
             "base = first[island]",
@@ -271,6 +278,7 @@ class IslandKernel:
             "for s in range(count):",
             "    clock = max(t0 + (k0 + s) * dt, birth[island])",
             "    end = t0 + (k0 + s + 1) * dt",
+            *indented(anew, 1),
             "    if clock < end and bad == 0:",
             f"        bad = advance({call})",
             "far, fast = reached(xi, n), reached(vi, n)",
@@ -278,7 +286,7 @@ class IslandKernel:
             "reach[island, 0] = far",
             "reach[island, 1] = fast",
         ]
-        data = ", ".join([*deriv.data, *(f"S{f.number}" for f in deriv.families)])
+        data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers)])
         grid = "birth, t0, dt, k0, count, controls, work, status, reach"
         loop = [*self.scratch, "for island in range(lo, hi):", *indented(island, 1)]
         head = ["@njit(**FLAGS)", f"def run(lo, hi, first, x, v, {data}, M, {grid}):"]
@@ -318,6 +326,7 @@ class IslandMembers:
         everybody = len(rows) == len(self.place) and bool((np.diff(rows) == 1).all())
         self.order = None if everybody else rows
         self.families = [self._family(f.force) for f in kernel.deriv.families]
+        self.pairs = [PairArrays(p, kernel.system.particles, self.place) for p in kernel.deriv.pairs]
 
     def _family(self, force: Any) -> tuple[Rows, Incidence]:
         """Elements of a force in the order of the kernel, and where they are."""
@@ -337,6 +346,10 @@ class IslandMembers:
             data += [found.nodes, family.table.array(len(elements), dtype, elements), found.ends, found.entries]
             starts.append(found.start)
             most.append(int(np.diff(found.start).max(initial=0)))
+        for pairs in self.pairs:
+            data += pairs.arrays()
+            home = np.searchsorted(self.first, pairs.rows[0], side="right") - 1 if len(pairs.rows) else islands
+            starts.append(np.where(np.arange(islands + 1) > home, len(pairs.rows), 0))
         begin = np.full(islands, -np.inf) if births is None else np.maximum.reduceat(births, self.first[:-1])
         control, work = np.zeros((islands, len(CONTROL))), np.zeros((islands, 3), np.int64)
         if CONTROL[0] in memory:
@@ -365,4 +378,7 @@ class IslandMembers:
                 memory[name][self.islands] = column
         steps, evaluations = (int(w) for w in work[:, :2].max(axis=0))
         stats = Stats(steps, int(work[:, 2].sum()), evaluations)
-        return Outcome(not status.any(), reach.max(axis=0), stats)
+        if (status & FULL).any():
+            for pairs in self.pairs:
+                pairs.enlarge()
+        return Outcome(not status.any(), reach.max(axis=0), stats, bool((status == FULL).any()))
