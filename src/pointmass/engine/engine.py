@@ -8,6 +8,7 @@ it again on the reference path, which names what it was.
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -16,6 +17,8 @@ from numpy.typing import NDArray
 
 from pointmass.engine.binding import kinds
 from pointmass.engine.island import IslandKernel, Outcome, Span
+from pointmass.engine.lanes import LanesKernel, topologies
+from pointmass.engine.lattice import LatticeKernel, grid
 from pointmass.engine.reference import ReferenceEngine
 from pointmass.engine.singles import SinglesKernel
 from pointmass.engine.threads import spread
@@ -33,6 +36,7 @@ from pointmass.system import ParticleSystem
 
 Rows = NDArray[np.intp]
 GRAIN = 2**16  # rows that are worth a thread
+SMALLEST_GRID = 64  # particles of an island that may be a grid
 LARGE = 4096  # particles of an island that is worth all threads
 LARGE_IN_PAIRS = 512  # the same, where pairs of them act
 WORK = 1e9  # particle-steps between two returns to Python: so long Ctrl-C waits
@@ -225,27 +229,51 @@ class Engine:
         newborn = None if births is None else births > start
         key = (system.particles.version, self._kinds(), newborn is None)
         if self._structure is not islands or self._groups[0] != key or newborn is not None:
-            self._structure, self._groups = islands, (key, self._made_groups(islands, newborn))
+            self._structure, self._groups = islands, (key, self._made_groups(islands, newborn is not None))
         return self._groups[1]
 
-    def _made_groups(self, islands: Rows, newborn: NDArray[np.bool_] | None) -> list[Group]:
-        system, size = self.system, np.bincount(islands)[islands]
-        alone = (size == 1) & (control_of(self.solver) is None)
-        births = newborn is not None
-        groups = [self._group(SinglesKernel, np.flatnonzero(alone), islands, births)] if alone.any() else []
-        pairs = any(isinstance(force, PairForce) and force.enabled for force in system.forces)
-        large = size >= (LARGE_IN_PAIRS if pairs else LARGE)
-        for island in np.unique(islands[large]):
-            groups.append(self._group(IslandKernel, np.flatnonzero(islands == island), islands, True))
-        others = np.flatnonzero(~alone & ~large)
-        if len(others):
-            others = others[np.argsort(islands[others], kind="stable")]
-            groups.append(self._group(IslandKernel, others, islands, False))
+    def _made_groups(self, islands: Rows, births: bool) -> list[Group]:
+        """Particles by the layout of their islands: lanes where there are many alike, rows of a grid, all threads on
+        one that is large."""
+        size = np.bincount(islands)[islands]
+        alone = (size == 1) & _by_lanes(self.solver)
+        groups = [self._made(SinglesKernel, np.flatnonzero(alone), islands, births)] if alone.any() else []
+        left = np.flatnonzero(~alone)
+        left = left[np.argsort(islands[left], kind="stable")]
+        if len(left) and not births:
+            for rows, members in self._side_by_side(left, islands[left]):
+                groups.append(self._group(rows, members))
+                left = left[~np.isin(left, rows)]
+        large = size[left] >= (LARGE_IN_PAIRS if self._pairs else LARGE)
+        for island in np.unique(islands[left[large]]):
+            groups.append(self._made(IslandKernel, left[islands[left] == island], islands, True))
+        if not large.all():
+            groups.append(self._made(IslandKernel, left[~large], islands, False))
         return groups
 
-    def _group(self, kind: Any, rows: Rows, islands: Rows, *how: bool) -> Group:
-        everybody = len(rows) == len(islands) and bool((np.diff(rows) == 1).all())
-        return Group(None if everybody else rows, self._kernel(kind, *how).members(rows, islands[rows]))
+    def _side_by_side(self, rows: Rows, labels: Rows) -> Iterator[tuple[Rows, Members]]:
+        """Islands that have a vector layout, each with its particles in the order of its kernel."""
+        system, solver = self.system, self.solver
+        if LanesKernel.fits(system, solver):
+            for topology in topologies(system, rows, labels):
+                yield topology.rows.ravel(), LanesKernel(system, solver, topology).members(topology)
+        if LatticeKernel.fits(system, solver):
+            names, counts = np.unique(labels, return_counts=True)
+            for island in names[counts >= SMALLEST_GRID]:
+                found = grid(system, rows[labels == island])
+                if found is not None:
+                    yield found.members, LatticeKernel(system, solver, found).members(found)
+
+    @property
+    def _pairs(self) -> bool:
+        return any(isinstance(force, PairForce) and force.enabled for force in self.system.forces)
+
+    def _made(self, kind: Any, rows: Rows, islands: Rows, *how: bool) -> Group:
+        return self._group(rows, self._kernel(kind, *how).members(rows, islands[rows]))
+
+    def _group(self, rows: Rows, members: Members) -> Group:
+        everybody = len(rows) == len(self.system.particles) and bool((np.diff(rows) == 1).all())
+        return Group(None if everybody else rows, members)
 
     def _kernel(self, kind: Any, *how: bool) -> Any:
         """The kernel of a kind for the system as it is, printed once."""
@@ -286,3 +314,8 @@ def _copied(target: Array, source: Array) -> None:
 
 def _has_step(solver: Solver) -> bool:
     return isinstance(solver, (ExplicitRungeKutta, Splitting))
+
+
+def _by_lanes(solver: Solver) -> bool:
+    """Whether all take the same steps, so that they can be taken side by side."""
+    return _has_step(solver) and control_of(solver) is None

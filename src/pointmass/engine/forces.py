@@ -88,13 +88,18 @@ class Deriv:
     @property
     def data(self) -> list[str]:
         """Names of the arrays of a kernel that are the same for all islands."""
-        arrays = [*self.binder.arrays, *(a for f in (*self.families, *self.pairs) for a in f.arguments)]
+        elements = [a for f in self.families for a in f.arguments]
+        arrays = [*self.binder.arrays, *elements, *(a for p in self.pairs for a in p.arguments)]
         return arrays if self.contact is None else [*arrays, "F"]
 
     @property
     def call(self) -> str:
         """The arguments of a call that all islands' calls share, as text."""
-        own = [a for f in (*self.families, *self.pairs) for a in f.locals] + ["K"] * (self.contact is not None)
+        own = (
+            [a for f in self.families for a in f.locals]
+            + [a for p in self.pairs for a in p.locals]
+            + ["K"] * (self.contact is not None)
+        )
         return ", ".join(["base", "n", *self.data, *own])
 
     def _printed(self) -> str:

@@ -261,7 +261,7 @@ class IslandKernel:
     def _run(self) -> str:
         """The kernel itself: the islands of a group over a span."""
         deriv = self.deriv
-        numbers = [f.number for f in (*deriv.families, *deriv.pairs)]
+        numbers = [f.number for f in deriv.families] + [p.number for p in deriv.pairs]
         ranges = [line for j in numbers for line in (f"s{j} = S{j}[island]", f"e{j} = S{j}[island + 1]")]
         lists = [f"K{p.number}[0] = 0" for p in deriv.pairs if p.near]
         anew = [f"if (k0 + s) % {CHECKPOINT} == 0:", *indented(lists, 1)] if lists else []
