@@ -192,7 +192,7 @@ class Simulation:
         system = self.system
         result = {"particles": float(len(system.particles))}
         if system.order == 2:
-            energy, momentum = system.energy(), system.momentum()
+            energy, momentum = system.energy(self.engine.pair_energies()), system.momentum()
             result |= {"energy": energy.total, "kinetic": energy.kinetic, "potential": energy.potential}
             result |= {f"momentum_{a}": float(q) for a, q in zip("xyz", momentum, strict=True)}
             result["stretch"] = system.stretch()
@@ -321,9 +321,7 @@ class Simulation:
     def _natural_speed(self) -> float:
         """The largest speed that the start explains: that of the particles, of their fall for a second, across the
         scene."""
-        system, p = self.system, self.system.particles
-        with np.errstate(all="ignore"):
-            rate = system.deriv_eval(self.t0, self._start)  # refuses parameters that are not allowed at the start
+        p, rate = self.system.particles, self.engine.start()
         if not len(p):
             return 10.0
         extent = float(np.ptp(p.x, axis=0).max())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -208,14 +208,22 @@ class ParticleSystem:
 
     # ---------------------------------------------------------------------------------------- what users ask
 
-    def energy(self) -> Energy:
-        """Kinetic and potential energy now [J]."""
+    def energy(self, known: Mapping[Force, float] | None = None) -> Energy:
+        """Kinetic and potential energy now [J].
+
+        Parameters
+        ----------
+        known : potential energies of forces that somebody else has computed [J].
+        """
         p = self.particles
         speed2 = np.einsum("ij,ij->i", p.v.astype(np.float64), p.v.astype(np.float64))
         parts: dict[str, float] = {}
         without = []
         for force in self.forces:
-            value = force.energy(p, self.t, p.x, p.v) if force.enabled else 0.0
+            if known is not None and force in known:
+                value: float | None = known[force]
+            else:
+                value = force.energy(p, self.t, p.x, p.v) if force.enabled else 0.0
             if value is None:
                 without.append(force.name)
             else:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.engine.binding import kinds
+from pointmass.engine.energy import PairEnergy
 from pointmass.engine.island import IslandKernel, Outcome, Span
 from pointmass.engine.lanes import LanesKernel, topologies
 from pointmass.engine.lattice import LatticeKernel, grid
@@ -24,6 +25,7 @@ from pointmass.engine.singles import SinglesKernel
 from pointmass.engine.threads import spread
 from pointmass.errors import InvalidInput
 from pointmass.laws.elements import ElementForce
+from pointmass.laws.force import Force
 from pointmass.laws.pairs import PairForce
 from pointmass.laws.unary import UnaryForce
 from pointmass.particles import Array
@@ -38,6 +40,7 @@ Rows = NDArray[np.intp]
 GRAIN = 2**16  # rows that are worth a thread
 SMALLEST_GRID = 64  # particles of an island that may be a grid
 LARGE = 4096  # particles of an island that is worth all threads
+MANY = 2000  # particles whose pairs take long in NumPy
 LARGE_IN_PAIRS = 512  # the same, where pairs of them act
 WORK = 1e9  # particle-steps between two returns to Python: so long Ctrl-C waits
 LONGEST = 256  # steps of a span
@@ -84,6 +87,7 @@ class Engine:
     _looked: bool = False  # whether the last step can no longer be looked into
     _kernels: tuple[Any, dict[Any, Any]] = (None, {})
     _groups: tuple[Any, list[Group]] = (None, [])
+    _energies: dict[Force, tuple[Any, PairEnergy]] = field(default_factory=dict)
     _structure: Rows | None = None  # islands that the groups are made of
 
     def __post_init__(self) -> None:
@@ -106,6 +110,44 @@ class Engine:
             *(force.name for force in system.forces if not isinstance(force, (UnaryForce, ElementForce, PairForce))),
             *([] if _has_step(self.solver) else [self.solver.name]),
         ]
+
+    def start(self) -> Array:
+        """dy/dt now, where it may be without pairs of many particles: those take long in NumPy.
+
+        Raises
+        ------
+        InvalidInput
+            A parameter that is a function of time is not allowed now.
+        """
+        system, p = self.system, self.system.particles
+        many = [f for f in self._pairs_of_many() if f.enabled]
+        for force in many:
+            force.settings(p, system.t, p.select(force.on))
+        try:
+            for force in many:
+                force.enabled = False
+            with np.errstate(all="ignore"):
+                return system.deriv_eval()
+        finally:
+            for force in many:
+                force.enabled = True
+
+    def pair_energies(self) -> dict[Force, float]:
+        """Potential energies of the pairs of many particles [J], by kernels."""
+        system = self.system
+        found: dict[Force, float] = {}
+        for force in self._pairs_of_many():
+            if force.enabled and force.traced_potential is not None:
+                key = (system.particles.version, kinds([force]))
+                if force not in self._energies or self._energies[force][0] != key:
+                    self._energies[force] = key, PairEnergy(force, system.particles)
+                found[force] = self._energies[force][1](system.t)
+        return found
+
+    def _pairs_of_many(self) -> list[PairForce]:
+        p = self.system.particles
+        pairs = [f for f in self.system.forces if isinstance(f, PairForce)] if self.compiled else []
+        return [force for force in pairs if len(p.select(force.on)) > MANY]
 
     def longest(self) -> int:
         """How many steps a span may have."""

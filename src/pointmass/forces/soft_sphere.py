@@ -16,9 +16,9 @@ from pointmass.tracing import functions as fn
 class SoftSphere(PairForce):
     """f = [k_s s - k_d (v_i - v_j) . n] n where two balls overlap by s = r_i + r_j - |d|, n = d/|d|, d = x_i - x_j.
 
-    A linear spring and dashpot (Cundall & Strack 1979). With z = k_d / (2 sqrt(k_s mu)), mu their reduced mass, two balls
-    part with exp(-pi z / sqrt(1 - z^2)) of the speed with which they met, after pi sqrt(mu / (k_s (1 - z^2))); a step
-    should be some twentieth of that. Balls whose centres coincide do not push.
+    A linear spring and dashpot (Cundall & Strack 1979). With z = k_d / (2 sqrt(k_s mu)), mu their reduced mass, two
+    balls part with exp(-pi z / sqrt(1 - z^2)) of the speed with which they met, after pi sqrt(mu / (k_s (1 - z^2))); a
+    step should be some twentieth of that. Balls whose centres coincide do not push.
 
     Parameters
     ----------
