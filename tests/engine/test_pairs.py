@@ -190,6 +190,19 @@ def test_a_crowd_needs_more_room() -> None:
     assert kernel.arrays.arrays()[3][1] > 89
 
 
+def test_room_grows_before_it_is_full_and_keeps_what_is_known() -> None:
+    p = cloud(20, "float64")
+    kernel = Kernel(fluid(cutoff=3.0), p, plain=True)
+    before = kernel()
+    head = kernel.arrays.arrays()[3]
+    kernel.arrays._reserve(3)
+    room = head[1]
+    assert head[2] == 19 < room < 24
+    np.testing.assert_array_equal(kernel(), before)
+    assert head[1] > room
+    assert head[3] == 1
+
+
 def test_one_who_is_lost_spoils_all_of_the_force_and_hangs_nothing() -> None:
     p = cloud(20, "float64")
     kernel = Kernel(coulomb(cutoff=0.5), p, plain=True)

@@ -460,8 +460,9 @@ class PairArrays:
         self._head = np.zeros(HEAD + -(-count // CHUNK), np.int64)
         self._cells = np.zeros(8 * count + 28, np.int32)
         self._origin = np.zeros(6 * count, dtype)
+        self._neighbours = np.zeros(0, np.int32)
         self._known: Any = None
-        self._reserve(64)
+        self._reserve(32)
 
     def arrays(self) -> list[Any]:
         """The kernel's arguments, in the order of `Pairs.arguments`; another cut-off makes it find neighbours anew."""
@@ -471,6 +472,8 @@ class PairArrays:
         if now != self._known:
             self._known = now
             self.forget()
+        if 5 * self._head[2] > 4 * self._head[1]:  # before it is full: a run that begins again finds all anew
+            self._reserve(int(self._head[2]))
         return [
             self.rows, self._work, self._forces, self._head, self._cells, self._neighbours, self._origin,
         ]  # fmt: skip
@@ -481,11 +484,21 @@ class PairArrays:
 
     def enlarge(self) -> None:
         """Make room after the status FULL; the span is then to be run again from its start."""
-        self._reserve(int(1.25 * self._head[2]) + 16)
+        if self._head[2] >= self._head[1]:
+            self._reserve(int(self._head[2]))
+            self.forget()
 
-    def _reserve(self, room: int) -> None:
-        self._head[:2] = 0, room
-        self._neighbours = np.zeros(room * len(self.rows) + PIECE if self.pairs.near else 0, np.int32)
+    def _reserve(self, most: int) -> None:
+        """Room for half as many neighbours again; those that are known stay, so that growing changes no bit."""
+        room, old = most * 3 // 2 + 16, int(self._head[1])
+        count = len(self.rows) if self.pairs.near else 0
+        grown = np.zeros(room * count + PIECE, np.int32)
+        if old:
+            each = min(old, room)
+            grown[: room * count].reshape(count, room)[:, :each] = self._neighbours[: old * count].reshape(count, old)[
+                :, :each
+            ]
+        self._head[1], self._neighbours = room, grown
 
 
 def _reach(force: PairForce, particles: Particles) -> float:
