@@ -67,7 +67,7 @@ def test_derivative_is_v_and_f_over_m():
     system = body()
     dy = system.deriv_eval(0.0)
     np.testing.assert_array_equal(dy[:18], V.ravel())
-    np.testing.assert_array_equal(dy[18:], (system.particles.f / M[:, None]).ravel())
+    np.testing.assert_allclose(dy[18:], (system.particles.f / M[:, None]).ravel(), rtol=4e-16)
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])

@@ -12,9 +12,9 @@ from pointmass.collisions.collider import Array, Collider, Contact
 from pointmass.collisions.laws import all_of, along, any_of
 from pointmass.collisions.plane import Plane
 from pointmass.errors import InvalidInput, finite_array
-from pointmass.laws import parameter
+from pointmass.laws.parameter import Vector
 from pointmass.tracing.functions import Number, Triple, absolute, length, maximum, minimum, where
-from pointmass.tracing.program import Vector
+from pointmass.tracing.program import Vector as Triplet
 
 FACES = [  # two triangles for each face, counter-clockwise seen from outside
     *([0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]),
@@ -35,7 +35,7 @@ class Box(Collider):
 
     def __init__(
         self,
-        center: parameter.Vector = (0.0, 0.0, 0.0),
+        center: Vector = (0.0, 0.0, 0.0),
         size: Any = (1.0, 1.0, 1.0),
         *,
         inside: bool = False,
@@ -69,7 +69,7 @@ class Box(Collider):
         second = ~first & (q[2] <= q[1])
         face = (where(first, 1.0, 0.0), where(second, 1.0, 0.0), where(first | second, 0.0, 1.0))
         n = along(out, length(out), face)
-        return Vector(sign * where(p < 0.0, -a, a) for p, a in zip(x, n, strict=True))
+        return Triplet(sign * where(p < 0.0, -a, a) for p, a in zip(x, n, strict=True))
 
     @staticmethod
     def apart_law(points: Sequence[Triple], room: Number, *shape: Number) -> Any:
@@ -98,7 +98,7 @@ class Box(Collider):
         return wall
 
 
-def _beyond(x: Triple, half: Sequence[Number]) -> tuple[Vector, Vector]:
+def _beyond(x: Triple, half: Sequence[Number]) -> tuple[Triplet, Triplet]:
     """How far a point is beyond the faces along each axis, and the same with 0 for within."""
-    q = Vector(absolute(a) - h for a, h in zip(x, half, strict=True))
-    return q, Vector(maximum(a, 0.0) for a in q)
+    q = Triplet(absolute(a) - h for a, h in zip(x, half, strict=True))
+    return q, Triplet(maximum(a, 0.0) for a in q)

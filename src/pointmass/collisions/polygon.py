@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from pointmass.collisions.collider import Array, Collider, Contact
 from pointmass.collisions.laws import all_of, along, any_of
 from pointmass.errors import InvalidInput, finite_array, number
-from pointmass.laws import parameter
+from pointmass.laws.parameter import Vector
 from pointmass.tracing.functions import Number, Triple, dot, length, maximum, minimum, scale, sub, where
-from pointmass.tracing.program import Vector
+from pointmass.tracing.program import Vector as Triplet
 
 
 class Polygon(Collider):
@@ -34,7 +34,7 @@ class Polygon(Collider):
         vertices: Any,
         *,
         thickness: float = 2e-3,
-        shift: parameter.Vector = (0.0, 0.0, 0.0),
+        shift: Vector = (0.0, 0.0, 0.0),
         restitution: float = 0.5,
         friction: float = 0.3,
         eps: float = 1e-4,
@@ -99,7 +99,7 @@ def _parts(shape: Triple) -> tuple[list[Triple], list[Triple], Triple, Number]:
     return triples[: len(triples) // 2], triples[len(triples) // 2 :], normal, shape[-1]
 
 
-def _from_nearest(x: Triple, shape: Triple) -> Vector:
+def _from_nearest(x: Triple, shape: Triple) -> Triplet:
     """From the nearest point of the flat polygon to x."""
     corners, outward, normal, _ = _parts(shape)
     best = scale(dot(sub(x, corners[0]), normal), normal)
