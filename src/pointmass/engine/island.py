@@ -123,7 +123,8 @@ class IslandKernel:
     def _step_text(self) -> StepText:
         depends = self.system.velocity_dependent
         order, loop = self.system.order, self.deriv.loop
-        return step_text(self.solver, order, self.dtype, loop, depends, self.impacts is not None)
+        steady = all(force.steady for force in self.system.forces)
+        return step_text(self.solver, order, self.dtype, loop, depends, steady, self.impacts is not None)
 
     @property
     def work(self) -> list[str]:
@@ -134,7 +135,7 @@ class IslandKernel:
     @property
     def call(self) -> str:
         """The arguments of `advance`, as text."""
-        more = [] if self.impacts is None else ["events", "paid", "when"]
+        more = ["known"] * self.step.keeps + ([] if self.impacts is None else ["events", "paid", "when"])
         return ", ".join([self.deriv.call, "clock, end, x, v", *self.work, *more, "control, done"])
 
     @property
@@ -144,6 +145,7 @@ class IslandKernel:
         families = enumerate(self.deriv.families)
         lines = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{k + 1}], R)" for k, f in families]
         lines += [f"{name} = np.empty(3 * M[0], R)" for name in self.work]
+        lines += ["known = np.zeros(1, np.int64)"] * self.step.keeps
         if contact is not None:
             lines.append(f"K = np.zeros({contact.record} * M[0])")
             lines += [f"{name} = np.zeros(M[0], np.int64)" for name in ("events", "paid")]
@@ -264,6 +266,7 @@ class IslandKernel:
         numbers = [f.number for f in deriv.families] + [p.number for p in deriv.pairs]
         ranges = [line for j in numbers for line in (f"s{j} = S{j}[island]", f"e{j} = S{j}[island + 1]")]
         lists = [f"K{p.number}[0] = 0" for p in deriv.pairs if p.near]
+        lists += ["known[0] = 0"] * (self.step.keeps and bool(lists))
         anew = [f"if (k0 + s) % {CHECKPOINT} == 0:", *indented(lists, 1)] if lists else []
         call = self.call.replace(", x, v, ", ", xi, vi, ")
         island = [
@@ -274,6 +277,7 @@ class IslandKernel:
             "vi = v[3 * base:3 * (base + n)]",
             "control = controls[island]",
             "done = work[island]",
+            *["known[0] = 0"] * self.step.keeps,
             "bad = 0",
             "for s in range(count):",
             "    clock = max(t0 + (k0 + s) * dt, birth[island])",

@@ -135,9 +135,7 @@ class Motion:
         self.lines += [f"f_{a} = R(0)" for a in AXES]
         state = {f"{q}_{a}": f"{name}_{a}" for q, name in (("x", x), ("v", v)) for a in AXES}
         for j, force in enumerate(self.forces):
-            self.timed = (
-                self.timed or "t" in force.traced.depends_on or not all(p.steady for p in force.parameters.values())
-            )
+            self.timed = self.timed or not force.steady
             timed, lines = unary(self.binder, force, f"f{j}_{k}", state, LANE, f"s{k}")
             self.at_time += timed
             self.lines += lines

@@ -25,28 +25,31 @@ class StepText:
     work : names of the arrays that it needs, each of length 3n.
     lines : statements; the slopes dy/dt = (kx, kv) are written SLOPE(t, x, v, kx, kv).
     evaluations : of the forces.
+    keeps : whether the slope of the end is that of the next beginning, and is used again where `known` says so.
     error : statements that put the error over tolerance into ex and ev, from methods that have one.
     """
 
     work: list[str]
     lines: list[str]
     evaluations: int
+    keeps: bool = False
     error: list[str] = field(default_factory=list)
 
 
 def step_text(
-    solver: Solver, order: int, dtype: str, loop: str, velocity_dependent: bool, contacts: bool = False
+    solver: Solver, order: int, dtype: str, loop: str, velocity_dependent: bool, steady: bool, contacts: bool
 ) -> StepText:
     """The step of a solver.
 
     Parameters
     ----------
+    steady : whether forces are the same at all times.
     contacts : whether somebody may be `standing` on a surface: then accelerations depend on velocities.
     """
     if isinstance(solver, ExplicitRungeKutta):
         return _explicit(solver, order, dtype, loop)
     assert isinstance(solver, Splitting)
-    return _splitting(solver, dtype, loop, velocity_dependent, contacts)
+    return _splitting(solver, dtype, loop, velocity_dependent, steady, contacts)
 
 
 def _weighted(weights: Sequence[float], slopes: str, dtype: str) -> str:
@@ -75,11 +78,16 @@ def _explicit(solver: ExplicitRungeKutta, order: int, dtype: str, loop: str) -> 
             size = f"maximum(abs({y}[q]), abs({y}1[q]))"
             error.append(f"    e{y}[q] = (hr * ({_weighted(weights, k, dtype)})) / scale({size})")
     work = [f"{k}{i}" for i in range(stages) for k in ("kx", "kv")] + ["tx", "tv"] + ["ex", "ev"] * bool(error)
-    return StepText(work, lines, stages, error)
+    return StepText(work, lines, stages, error=error)
 
 
-def _splitting(solver: Splitting, dtype: str, loop: str, velocity_dependent: bool, contacts: bool) -> StepText:
-    lines = [f"for q in {loop}(3 * n):", "    x1[q] = x[q]", "    v1[q] = v[q]", "status |= SLOPE(t, x, v, kx, kv)"]
+def _splitting(
+    solver: Splitting, dtype: str, loop: str, velocity_dependent: bool, steady: bool, contacts: bool
+) -> StepText:
+    keeps = solver.substeps[-1].closing != 0.0 and steady and not velocity_dependent and not contacts
+    start = "status |= SLOPE(t, x, v, kx, kv)"
+    lines = [f"for q in {loop}(3 * n):", "    x1[q] = x[q]", "    v1[q] = v[q]"]
+    lines += ["if known[0] == 0:", f"    {start}", "known[0] = 1"] if keeps else [start]
     passes = solver.passes if velocity_dependent else 1
     evaluations, fresh = 1, True
     for (opening, drift, closing), (before, after) in zip(solver.substeps, solver._times, strict=True):
@@ -107,4 +115,4 @@ def _splitting(solver: Splitting, dtype: str, loop: str, velocity_dependent: boo
                 "        v1[q] = before[q] + kick * kv[q]",
             ]
             evaluations += passes
-    return StepText(["kx", "kv", "before"], lines, evaluations)
+    return StepText(["kx", "kv", "before"], lines, evaluations, keeps)

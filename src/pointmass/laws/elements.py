@@ -7,7 +7,7 @@ sum has the same bits on any number of threads.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -71,6 +71,10 @@ class ElementForce(Force):
     @property
     def velocity_dependent(self) -> bool:
         return any(name in self.traced.depends_on for name in self._names("v"))
+
+    @property
+    def laws(self) -> Sequence[Traced]:
+        return (self.traced,)
 
     def bind(self, particles: Particles) -> None:
         super().bind(particles)

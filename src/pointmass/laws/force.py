@@ -172,6 +172,17 @@ class Force(Described, ABC):
     def velocity_dependent(self) -> bool:
         """Whether the law depends on velocities."""
 
+    @property
+    def laws(self) -> Sequence[Traced]:
+        """The programs that make up the force; none where it is not traced."""
+        return ()
+
+    @property
+    def steady(self) -> bool:
+        """Whether it is the same at all times, as far as anybody can know."""
+        timeless = all("t" not in law.depends_on for law in self.laws)
+        return bool(self.laws) and timeless and all(p.steady for p in self.parameters.values())
+
     def bind(self, particles: Particles) -> None:
         """Check the force against the particles that it will act on.
 

@@ -95,6 +95,10 @@ class PairForce(Force):
         """The cut-off [m]; None = all pairs."""
         return float(self.parameters["cutoff"].components[0].value) if "cutoff" in self.parameters else None  # type: ignore[arg-type]
 
+    @property
+    def laws(self) -> Sequence[Traced]:
+        return (self.traced,) if self.traced_finish is None else (self.traced, self.traced_finish)
+
     def bind(self, particles: Particles) -> None:
         super().bind(particles)
         for p in self.parameters.values():

@@ -45,6 +45,10 @@ class UnaryForce(Force):
     def velocity_dependent(self) -> bool:
         return "v" in self.traced.depends_on
 
+    @property
+    def laws(self) -> Sequence[Traced]:
+        return (self.traced,)
+
     def bind(self, particles: Particles) -> None:
         super().bind(particles)
         for p in self.parameters.values():
@@ -98,11 +102,6 @@ class VelocityField(UnaryForce):
 
     order: ClassVar[int] = 1
     reads: ClassVar[tuple[str, ...]] = ("x", "t")
-
-    @property
-    def steady(self) -> bool:
-        """Whether the field is the same at all times."""
-        return "t" not in self.traced.depends_on and all(p.steady for p in self.parameters.values())
 
 
 def unary_force(law: Callable[..., Any]) -> type[UnaryForce]:
