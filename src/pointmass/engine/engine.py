@@ -8,6 +8,7 @@ it again on the reference path, which names what it was.
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -16,6 +17,9 @@ from numpy.typing import NDArray
 
 from pointmass.engine.binding import kinds
 from pointmass.engine.island import IslandKernel, Outcome, Span
+from pointmass.engine.lanes import LanesKernel, topologies
+from pointmass.engine.lattice import SMALLEST, LatticeKernel, grid
+from pointmass.engine.phases import simple
 from pointmass.engine.reference import ReferenceEngine
 from pointmass.engine.singles import SinglesKernel
 from pointmass.engine.threads import spread
@@ -233,19 +237,37 @@ class Engine:
         alone = (size == 1) & (control_of(self.solver) is None)
         births = newborn is not None
         groups = [self._group(SinglesKernel, np.flatnonzero(alone), islands, births)] if alone.any() else []
+        rest = ~alone
+        if not births:
+            for rows, members in self._side_by_side(islands, rest):
+                groups.append(Group(None if _everybody(rows, islands) else rows, members))
+                rest[rows] = False
         pairs = any(isinstance(force, PairForce) and force.enabled for force in system.forces)
-        large = size >= (LARGE_IN_PAIRS if pairs else LARGE)
+        large = rest & (size >= (LARGE_IN_PAIRS if pairs else LARGE))
         for island in np.unique(islands[large]):
             groups.append(self._group(IslandKernel, np.flatnonzero(islands == island), islands, True))
-        others = np.flatnonzero(~alone & ~large)
+        others = np.flatnonzero(rest & ~large)
         if len(others):
             others = others[np.argsort(islands[others], kind="stable")]
             groups.append(self._group(IslandKernel, others, islands, False))
         return groups
 
+    def _side_by_side(self, islands: Rows, rest: NDArray[np.bool_]) -> Iterator[tuple[Rows, Members]]:
+        """Islands of one topology, and grids, with the kernels that take them as vectors."""
+        system, solver = self.system, self.solver
+        rows = np.flatnonzero(rest)
+        if not len(rows) or not simple(system, solver):
+            return
+        rows = rows[np.argsort(islands[rows], kind="stable")]
+        for topology in topologies(system, rows, islands[rows]):
+            yield topology.rows.ravel(), LanesKernel(system, solver, topology).members(topology)
+        for island in np.flatnonzero(np.bincount(islands[rows]) >= SMALLEST**2):
+            found = grid(system, rows[islands[rows] == island]) if rest[islands == island].all() else None
+            if found is not None:
+                yield found.members, LatticeKernel(system, solver, found).members(found)
+
     def _group(self, kind: Any, rows: Rows, islands: Rows, *how: bool) -> Group:
-        everybody = len(rows) == len(islands) and bool((np.diff(rows) == 1).all())
-        return Group(None if everybody else rows, self._kernel(kind, *how).members(rows, islands[rows]))
+        return Group(None if _everybody(rows, islands) else rows, self._kernel(kind, *how).members(rows, islands[rows]))
 
     def _kernel(self, kind: Any, *how: bool) -> Any:
         """The kernel of a kind for the system as it is, printed once."""
@@ -268,6 +290,11 @@ def compiled_by_default() -> bool:
     if named not in ("compiled", "reference"):
         raise InvalidInput(f"POINTMASS_ENGINE = {named!r} is not allowed: it must be 'compiled' or 'reference'")
     return named == "compiled"
+
+
+def _everybody(rows: Rows, islands: Rows) -> bool:
+    """Whether rows are those of all particles, in order."""
+    return len(rows) == len(islands) and bool((np.diff(rows) == 1).all())
 
 
 def _taken(array: Array, rows: Rows | None) -> Array:

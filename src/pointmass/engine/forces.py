@@ -206,11 +206,11 @@ class Deriv:
         if opposite:
             gather += [f"        b = np.uintp({count}) * (u >> np.uintp(1))"]
             gather += ["        second = (u & np.uintp(1)) != np.uintp(0)"]
-            for a, first, other in zip("xyz", terms[:3], terms[3:], strict=True):
+            for axis, first, other in zip("xyz", terms[:3], terms[3:], strict=True):
                 if first is not None and other is not None:
                     gather.append(f"        q = B{j}[b + np.uintp({first[0]})]")
                     ends = ("-q", "q") if first[1] == "-" else ("q", "-q")
-                    gather.append(f"        f_{a} = f_{a} + select(second, {ends[1]}, {ends[0]})")
+                    gather.append(f"        f_{axis} = f_{axis} + select(second, {ends[1]}, {ends[0]})")
         else:
             gather.append("        b = np.uintp(3) * u")
             gather += [f"        f_{a} = f_{a} + B{j}[b + np.uintp({k})]" for k, a in enumerate("xyz")]
