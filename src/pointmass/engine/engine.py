@@ -20,6 +20,7 @@ from pointmass.engine.energy import PairEnergy
 from pointmass.engine.island import IslandKernel, Outcome, Span
 from pointmass.engine.lanes import LanesKernel, topologies
 from pointmass.engine.lattice import LatticeKernel, grid
+from pointmass.engine.phases import simple
 from pointmass.engine.reference import ReferenceEngine
 from pointmass.engine.singles import SinglesKernel
 from pointmass.engine.threads import spread
@@ -296,15 +297,17 @@ class Engine:
     def _side_by_side(self, rows: Rows, labels: Rows) -> Iterator[tuple[Rows, Members]]:
         """Islands that have a vector layout, each with its particles in the order of its kernel."""
         system, solver = self.system, self.solver
-        if LanesKernel.fits(system, solver):
-            for topology in topologies(system, rows, labels):
-                yield topology.rows.ravel(), LanesKernel(system, solver, topology).members(topology)
-        if LatticeKernel.fits(system, solver):
-            names, counts = np.unique(labels, return_counts=True)
-            for island in names[counts >= SMALLEST_GRID]:
-                found = grid(system, rows[labels == island])
-                if found is not None:
-                    yield found.members, LatticeKernel(system, solver, found).members(found)
+        if not simple(system, solver):
+            return
+        single = np.ones(len(rows), bool)
+        for topology in topologies(system, rows, labels):
+            yield topology.rows.ravel(), LanesKernel(system, solver, topology).members(topology)
+            single &= ~np.isin(rows, topology.rows)
+        names, counts = np.unique(labels[single], return_counts=True)
+        for island in names[counts >= SMALLEST_GRID]:
+            found = grid(system, rows[labels == island])
+            if found is not None:
+                yield found.members, LatticeKernel(system, solver, found).members(found)
 
     @property
     def _pairs(self) -> bool:
@@ -338,6 +341,11 @@ def compiled_by_default() -> bool:
     if named not in ("compiled", "reference"):
         raise InvalidInput(f"POINTMASS_ENGINE = {named!r} is not allowed: it must be 'compiled' or 'reference'")
     return named == "compiled"
+
+
+def _everybody(rows: Rows, islands: Rows) -> bool:
+    """Whether rows are those of all particles, in order."""
+    return len(rows) == len(islands) and bool((np.diff(rows) == 1).all())
 
 
 def _taken(array: Array, rows: Rows | None) -> Array:

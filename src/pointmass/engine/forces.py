@@ -21,7 +21,9 @@ from pointmass.laws.elements import ElementForce
 from pointmass.laws.pairs import PairForce
 from pointmass.laws.unary import UnaryForce
 from pointmass.system import ParticleSystem
-from pointmass.tracing.trace import vector_names
+from pointmass.tracing.columns import expanded
+from pointmass.tracing.program import Program
+from pointmass.tracing.trace import Traced, vector_names
 
 
 @dataclass
@@ -181,25 +183,42 @@ class Deriv:
             for q in "xv":
                 names = vector_names(f"{q}{a + 1}")
                 state |= {name: f"{q}[n{a} + np.uintp({axis})]" for axis, name in enumerate(names)}
-        text: Text = self.binder.law(force.traced, force, state, "u", table, tag)
+        law, terms = different(force.traced)
+        opposite = nodes == 2 and all(_opposite(a, b) for a, b in zip(terms[:3], terms[3:], strict=True))
+        text: Text = self.binder.law(law if opposite else force.traced, force, state, "u", table, tag)
         self._at_time += text.at_time
         switch = self.binder.switch(force)
+        count = len(text.outputs)  # numbers of an element in the buffer
         evaluate = [
             f"# {force.name}",
             f"if {switch} != 0:",
-            f"    for u in {self.loop}(s{j}, e{j}):",
-            *(f"        n{a} = np.uintp(3) * np.uintp(E{j}[{nodes} * u + {a}])" for a in range(nodes)),
+            f"    for element in {self.loop}(s{j}, e{j}):",
+            "        u = np.uintp(element)",
+            *(
+                f"        n{a} = np.uintp(3) * np.uintp(E{j}[np.uintp({nodes}) * u + np.uintp({a})])"
+                for a in range(nodes)
+            ),
             *indented(text.lines, 2),
-            f"        b = np.uintp({3 * nodes} * (u - s{j}))",
+            f"        b = np.uintp({count}) * (u - np.uintp(s{j}))",
             *(f"        B{j}[b + np.uintp({k})] = {out}" for k, out in enumerate(text.outputs)),
         ]
         gather = [
             f"# {force.name}",
             f"if {switch} != 0:",
-            f"    for u in range(J{j}[g], J{j}[g + 1]):",
-            f"        b = np.uintp(3) * np.uintp(I{j}[u])",
-            *(f"        f_{a} = f_{a} + B{j}[b + np.uintp({k})]" for k, a in enumerate("xyz")),
+            f"    for entry in range(J{j}[g], J{j}[g + 1]):",
+            f"        u = np.uintp(I{j}[np.uintp(entry)])",
         ]
+        if opposite:
+            gather += [f"        b = np.uintp({count}) * (u >> np.uintp(1))"]
+            gather += ["        second = (u & np.uintp(1)) != np.uintp(0)"]
+            for axis, first, other in zip("xyz", terms[:3], terms[3:], strict=True):
+                if first is not None and other is not None:
+                    gather.append(f"        q = B{j}[b + np.uintp({first[0]})]")
+                    ends = ("-q", "q") if first[1] == "-" else ("q", "-q")
+                    gather.append(f"        f_{axis} = f_{axis} + select(second, {ends[1]}, {ends[0]})")
+        else:
+            gather.append("        b = np.uintp(3) * u")
+            gather += [f"        f_{a} = f_{a} + B{j}[b + np.uintp({k})]" for k, a in enumerate("xyz")]
         return evaluate, gather
 
 
@@ -223,6 +242,32 @@ def unary(
         if out != literal(0.0, binder.dtype)
     ]
     return text.at_time, [f"# {force.name}", *text.lines, *adds]
+
+
+def _opposite(a: tuple[int, str] | None, b: tuple[int, str] | None) -> bool:
+    """Whether two outputs of a law (see `different`) are each other's negative."""
+    return a == b if a is None or b is None else a[0] == b[0] and a[1] != b[1]
+
+
+def different(traced: Traced) -> tuple[Traced, list[tuple[int, str] | None]]:
+    """A law without the outputs that are another one with the other sign.
+
+    Returns
+    -------
+    law : its outputs are the forces that are different.
+    terms : number and sign of the one that each output of the law is; None for 0.
+    """
+    program = expanded(traced.program)
+    found: dict[int, int] = {}
+    terms: list[tuple[int, str] | None] = []
+    for node in program.outputs:
+        op, *rest = program.nodes[node]
+        if op == "const" and rest[0] == 0:
+            terms.append(None)
+        else:
+            base = rest[0] if op == "neg" else node
+            terms.append((found.setdefault(base, len(found)), "-" if op == "neg" else "+"))
+    return Traced(traced.name, traced.inputs, Program(program.nodes, list(found))), terms
 
 
 UNARY = {name: f"{q}[o_{axis}]" for q in "xv" for axis, name in zip("xyz", vector_names(q), strict=True)}

@@ -157,10 +157,10 @@ def topologies(system: ParticleSystem, rows: Rows, labels: Rows) -> list[Topolog
     for (size, *_), islands in alike.items():
         if len(islands) >= FEWEST and size > 1:
             families = []
-            for force, own, nodes, start in found:
+            for force, own, local, start in found:
                 begin, end = int(start[islands[0]]), int(start[islands[0] + 1])
                 each = own[start[islands][:, None] + np.arange(end - begin)]
-                families.append(Family(force, np.asarray(nodes[begin:end], np.int32), each))
+                families.append(Family(force, np.asarray(local[begin:end], np.int32), each))
             result.append(Topology(rows[first[islands][:, None] + np.arange(size)], families))
     return result
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from pointmass.engine import store
 from pointmass.engine.binding import Binder, Table
-from pointmass.engine.forces import unary
+from pointmass.engine.forces import different, unary
 from pointmass.engine.island import Array, Outcome, Rows, Span
 from pointmass.engine.phases import REACHED, STATE, entries, phases, regions, simple
 from pointmass.engine.printing import indented
@@ -28,9 +28,7 @@ from pointmass.laws.unary import UnaryForce
 from pointmass.solvers.advance import Stats
 from pointmass.solvers.base import Memory, Solver
 from pointmass.system import ParticleSystem
-from pointmass.tracing.columns import expanded
-from pointmass.tracing.program import Program
-from pointmass.tracing.trace import Traced, vector_names
+from pointmass.tracing.trace import vector_names
 
 AXES = "xyz"
 FARTHEST = 4  # rows or columns between the nodes of an element
@@ -154,27 +152,6 @@ def _sum(terms: list[list[str]], fresh: bool) -> list[str]:
         *indented([line for term in terms for line in term], 1),
         *indented([f"f[{k} * WIDTH + i] = f_{a}" for k, a in enumerate(AXES)], 1),
     ]
-
-
-def _bases(traced: Traced) -> tuple[Traced, list[tuple[int, str] | None]]:
-    """A law without the outputs that are another one with the other sign.
-
-    Returns
-    -------
-    law : its outputs are the forces that are different.
-    terms : number and sign of the one that each output of the law is; None for 0.
-    """
-    program = expanded(traced.program)
-    found: dict[int, int] = {}
-    terms: list[tuple[int, str] | None] = []
-    for node in program.outputs:
-        op, *rest = program.nodes[node]
-        if op == "const" and rest[0] == 0:
-            terms.append(None)
-        else:
-            base = rest[0] if op == "neg" else node
-            terms.append((found.setdefault(base, len(found)), "-" if op == "neg" else "+"))
-    return Traced(traced.name, traced.inputs, Program(program.nodes, list(found))), terms
 
 
 class LatticeKernel:
@@ -318,7 +295,7 @@ class LatticeKernel:
         """
         stencil, slot = self.grid.stencils[k], self.slots
         force = stencil.force
-        law, outputs = _bases(force.traced)
+        law, outputs = different(force.traced)
         self.slots += len(law.program.outputs)
         state = {"t": "R(t)"}
         for b, shift in enumerate(stencil.shifts):

@@ -152,8 +152,6 @@ def _import(name: str, path: Path) -> ModuleType:
     spec = spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
-    # Threads that spin while they wait slow each other down where there are more of them than cores.
-    os.environ.setdefault("GOMP_SPINCOUNT", "1000")
     module = module_from_spec(spec)
     sys.modules[name] = module  # Numba looks functions up by the name of their module
     spec.loader.exec_module(module)
