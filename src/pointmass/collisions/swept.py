@@ -20,6 +20,7 @@ RESOLUTION = 2.0**-50  # of a fraction of the way
 ROOT_STEPS = 128  # every second one halves the bracket or the step
 MOST_CHORDS = 4096
 NEWTON_STEPS = 60
+BACK_STEPS = 60  # each twice as long as the one before
 SAMPLES = (0.0, 0.5, 1.0)  # of a step, where the acceleration of a moving surface is looked at
 
 
@@ -85,6 +86,7 @@ class _Approach:
 
     def __init__(self, surface: Collider, paths: Paths, level: Array) -> None:
         self.surface, self.paths, self.level = surface, paths, level
+        self.bulges = surface.bulges
 
     def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> _Approach:
         return _Approach(self.surface, self.paths.take(rows), self.level[rows])
@@ -105,13 +107,78 @@ class _Approach:
     def gap_at(self, local: Array) -> Array:
         return self.surface.local_distance(local) - self.paths.radius - self.level
 
+    def bends(self) -> Array:
+        """Bound of the second derivative to theta [m], shape (k,)."""
+        bend = self.paths.bends()
+        return bend + _swing(self.surface, self.paths) if self.surface.moves else bend
+
     def chords(self) -> NDArray[np.intp]:
         """How many chords stay within eps of each path."""
-        bend = self.paths.bends()
-        if self.surface.moves:
-            bend = bend + _swing(self.surface, self.paths)
-        count: NDArray[np.intp] = np.ceil(np.sqrt(bend / (8 * self.surface.eps))).clip(1, MOST_CHORDS).astype(np.intp)
+        count: NDArray[np.intp] = (
+            np.ceil(np.sqrt(self.bends() / (8 * self.surface.eps))).clip(1, MOST_CHORDS).astype(np.intp)
+        )
         return count
+
+    def possible(self) -> NDArray[np.bool_]:
+        """Where the way is so long, or the end so deep, that there may be a hit."""
+        surface, paths = self.surface, self.paths
+        start, end = paths.t0, paths.t0 + paths.h
+        way = paths.reach
+        if surface.moves:
+            way = way + lengths(surface.at(end) - surface.at(start)) + _swing(surface, paths)
+        free = self.gap_at(paths.x0 - surface.at(start))
+        deep: NDArray[np.bool_] = self.gap_at(paths.x1 - surface.at(end)) < 0
+        return (free < way) | deep
+
+    def free_side(self, theta: Array) -> Array:
+        """A hit where the gap is at least 0."""
+        return theta
+
+
+class _FlatApproach(_Approach):
+    """The same for a flat surface at rest: the gap along a cubic path is a cubic polynomial.
+
+    Round-off tells it from the distance of the place, so `hit` asks that in the end.
+    """
+
+    def __init__(self, surface: Collider, paths: Paths, level: Array) -> None:
+        super().__init__(surface, paths, level)
+        self.bulges = False
+        normal = surface.local_normal(paths.x0)
+        self.start, self.end = self.gap_at(paths.x0 - surface.at(0.0)), self.gap_at(paths.x1 - surface.at(0.0))
+        self.leave, self.arrive = paths.h * rows_dot(normal, paths.v0), paths.h * rows_dot(normal, paths.v1)
+        rise = self.end - self.start
+        self.square = 3 * rise - (2 * self.leave + self.arrive)
+        self.cube = (self.leave + self.arrive) - 2 * rise
+
+    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> _FlatApproach:
+        return _FlatApproach(self.surface, self.paths.take(rows), self.level[rows])
+
+    def gap(self, theta: Array) -> Array:
+        inside = self.start + theta * (self.leave + theta * (self.square + theta * self.cube))
+        return np.where(theta == 1.0, self.end, inside)
+
+    def slope(self, theta: Array) -> Array:
+        result: Array = self.leave + theta * (2 * self.square + theta * (3 * self.cube))
+        return result
+
+    def bends(self) -> Array:
+        return np.maximum(np.abs(2 * self.square), np.abs(2 * self.square + 6 * self.cube))
+
+    def possible(self) -> NDArray[np.bool_]:
+        """Where a number of Bezier's control polygon is below 0."""
+        near: NDArray[np.bool_] = self.start + self.leave / 3 < 0
+        return near | (self.end - self.arrive / 3 < 0) | (self.end < 0)
+
+    def free_side(self, theta: Array) -> Array:
+        back = np.full(len(theta), RESOLUTION)
+        for _ in range(BACK_STEPS):
+            inside = (super().gap(theta) < 0) & (theta > 0)
+            if not inside.any():
+                break
+            theta = np.where(inside, np.maximum(theta - back, 0), theta)
+            back = np.where(inside, 2 * back, back)
+        return theta
 
 
 def first_hit(surface: Collider, paths: Paths) -> Array:
@@ -120,20 +187,17 @@ def first_hit(surface: Collider, paths: Paths) -> Array:
     A particle that starts inside counts as on the surface: it may leave, and meets it when it sinks deeper.
     """
     theta = np.full(len(paths.h), np.inf)
-    start = surface.distance(paths.x0, paths.t0) - paths.radius
-    end = surface.distance(paths.x1, paths.t0 + paths.h) - paths.radius
-    level = np.minimum(start, 0)
-    way = paths.reach
-    if surface.moves:
-        way = way + lengths(surface.at(paths.t0 + paths.h) - surface.at(paths.t0)) + _swing(surface, paths)
-    rows = np.flatnonzero((start - level < way) | (end < level))
-    if not len(rows):
-        return theta
-    approach = _Approach(surface, paths.take(rows), level[rows])
-    low, high = _brackets(approach)
-    crossed = np.isfinite(high)
-    if crossed.any():
-        theta[rows[crossed]] = _root(approach.take(crossed), low[crossed], high[crossed])
+    level = np.minimum(surface.distance(paths.x0, paths.t0) - paths.radius, 0)
+    kind = _Approach if surface.curved or surface.moves else _FlatApproach
+    approach = kind(surface, paths, level)
+    rows = np.flatnonzero(approach.possible())
+    if len(rows):
+        approach = approach.take(rows)
+        low, high = _brackets(approach)
+        crossed = np.isfinite(high)
+        if crossed.any():
+            approach = approach.take(crossed)
+            theta[rows[crossed]] = approach.free_side(_root(approach, low[crossed], high[crossed]))
     return theta
 
 
@@ -175,20 +239,21 @@ def _brackets(approach: _Approach) -> tuple[Array, Array]:
     chords = approach.chords()
     k = len(chords)
     low, high = np.full(k, np.nan), np.full(k, np.inf)
-    a, start = approach.local(np.zeros(k)), np.zeros(k)
+    start = np.zeros(k)
     for j in range(1, int(chords.max()) + 1):
         open_ = (chords >= j) & np.isinf(high)
         if not open_.any():
             break
         end = np.minimum(j / chords, 1.0)
-        b = approach.local(end)
-        inside = np.where(approach.gap_at(b) < 0, end, np.nan)
-        if approach.surface.bulges and (look := open_ & np.isnan(inside)).any():
-            inside[look] = start[look] + _deepest(approach.take(look), a[look], b[look]) * (end - start)[look]
+        inside = np.where(approach.gap(end) < 0, end, np.nan)
+        if approach.bulges and (look := open_ & np.isnan(inside)).any():
+            part = approach.take(look)
+            middle = _deepest(part, part.local(start[look]), part.local(end[look]))
+            inside[look] = start[look] + middle * (end - start)[look]
         sunk = open_ & ~np.isnan(inside)
         sunk[sunk] = approach.take(sunk).gap(inside[sunk]) < 0
         low, high = np.where(sunk, start, low), np.where(sunk, inside, high)
-        a, start = b, end
+        start = end
     return low, high
 
 

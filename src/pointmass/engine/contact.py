@@ -45,12 +45,15 @@ from pointmass.laws.parameter import Component, Parameter
 from pointmass.tracing.columns import expanded
 from pointmass.tracing.trace import Traced, vector_names
 
-TABLE = ("KIND", "SWEPT", "MOTION", "BULGES", "RESTITUTION", "FRICTION", "NEAR", "ROOM", "PLACE", "", "", "SHAPE")
+TABLE = (  # columns of a surface's row
+    *("KIND", "SWEPT", "MOTION", "BULGES", "FLAT", "RESTITUTION", "FRICTION", "NEAR", "ROOM"),
+    *("PLACE", "", "", "SHAPE"),
+)
 RECORD = {  # of a contact, with the size of each
     **{"ON": 1, "LEVEL": 1, "START": 3, "SLIDE": 3, "SPEED": 1, "LOAD": 1, "GIVEN": 3, "NORMAL": 3},
     **{"PRESSED": 1, "HELD": 1, "STICKS": 1, "CARRIED": 3, "BEND": 1},
 }
-MARK = f"# {'-' * 106} printed\n"
+MARK = "# --- printed from here on\n"
 ROUNDING = {"float64": 1e-13, "float32": 1e-6}  # of the places between which `clear` looks, on top of eps
 PATH = [f"{p}{end}" for end in "01" for p in ("x", "y", "z", "u", "v", "w")]
 
@@ -88,7 +91,8 @@ class ContactText:
             motion = 1 + [id(m) for m in self._motions].index(id(s.motion)) if s.moves else 0
             place = [c.value if isinstance(c.value, float) else 0.0 for c in s.motion.parameters[0].components]
             room = s.eps + ROUNDING[self._dtype] * float(np.abs(place).sum())
-            numbers: list[float] = [self._kinds.index(s.laws), s.contact == "swept", motion, s.bulges]
+            flat = not s.curved and not s.moves
+            numbers: list[float] = [self._kinds.index(s.laws), s.contact == "swept", motion, s.bulges, flat]
             numbers += [s.restitution, s.friction, s.eps, room, *place, *s.shape]
             row[: len(numbers)] = numbers
         return result
@@ -246,7 +250,8 @@ def _constants(order: int, lagged: bool, dtype: str) -> list[str]:
     numbers = {name: k for k, name in enumerate(TABLE) if name} | dict(zip(RECORD, offsets, strict=False))
     numbers |= {"RECORD": offsets[-1], "ORDER": order, "LAGGED": lagged, "PASSES": contact.PASSES}
     numbers |= {"SQUARINGS": contact.PASSES.bit_length() - 1, "MOST_CHORDS": float(swept.MOST_CHORDS)}
-    numbers |= {"NEWTON_STEPS": swept.NEWTON_STEPS, "ROOT_STEPS": swept.ROOT_STEPS, "RESOLUTION": swept.RESOLUTION}
+    numbers |= {"NEWTON_STEPS": swept.NEWTON_STEPS, "ROOT_STEPS": swept.ROOT_STEPS, "BACK_STEPS": swept.BACK_STEPS}
+    numbers |= {"RESOLUTION": swept.RESOLUTION}
     numbers |= {"MOST_EVENTS": MOST_EVENTS, "EVICTIONS": EVICTIONS, "SETTLED": contact.SETTLED}
     numbers |= {"ROUND": contact.STILL * float(np.finfo(dtype).eps)}
     return [f"{name} = {value!r}" for name, value in numbers.items()]

@@ -1,31 +1,34 @@
 """What the colliders do to one particle, in scalars: the text of kernels, not a module to import.
 
-`contact.printed` puts constants and laws before it: `gap_of`, `normal_of`, `bending_of` of each kind of surface, and
+`ContactText` puts constants and laws before it: `gap_of`, `normal_of`, `bending_of` of each kind of surface, and
 `place_of`, `ground_of`, `push_of` (place, velocity and acceleration of a surface in time). Each function does what its
 model in `collisions` or `engine.reference` does to one row, operation by operation; the model says why.
 """
-# ruff: noqa: F821
+# ruff: noqa: F821, SIM110
 # mypy: ignore-errors
 
 import numpy as np
 from numba import njit
 
-# ---------------------------------------------------------------------------------------------------------- printed
+# --- printed from here on
 
 
 @njit(**FLAGS)
 def dot3(ax, ay, az, bx, by, bz):
+    """Scalar product."""
     return ax * bx + ay * by + az * bz
 
 
 @njit(**FLAGS)
 def length3(x, y, z):
+    """Length of a vector."""
     return np.sqrt(x * x + y * y + z * z)
 
 
 @njit(**FLAGS)
 def size3(x, y, z):
-    return max(max(abs(x), abs(y)), abs(z))
+    """The largest of three sizes."""
+    return max(abs(x), abs(y), abs(z))
 
 
 @njit(**FLAGS)
@@ -400,8 +403,17 @@ def enters(P, k, ax, ay, az, bx, by, bz, radius, level):
 
 
 @njit(**FLAGS)
+def chords_for(bend, eps):
+    """How many chords stay within eps: _Approach.chords."""
+    ratio = bend / (8 * eps)
+    return int(min(np.ceil(np.sqrt(ratio)), MOST_CHORDS)) if ratio > 1 else 1
+
+
+@njit(forceinline=True, **FLAGS)
 def first_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius):
     """Fraction at which a path first meets surface k: swept.first_hit; infinite where it does not."""
+    if P[k, FLAT] != 0:
+        return flat_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius)
     start = distance(P, k, t0, x0, y0, z0) - radius
     end = distance(P, k, t0 + h, x1, y1, z1) - radius
     level = min(start, 0.0)
@@ -418,13 +430,13 @@ def first_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radiu
     bend = bend_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h)
     if moves:
         bend = bend + swing
-    chords = int(min(max(np.ceil(np.sqrt(bend / (8 * P[k, NEAR]))), 1.0), MOST_CHORDS))
+    chords = chords_for(bend, P[k, NEAR])
     ax, ay, az = local_at(P, k, 0.0, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h)
     low = 0.0
     for j in range(1, chords + 1):
         stop = min(j / chords, 1.0)
         bx, by, bz = local_at(P, k, stop, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h)
-        high = np.nan
+        high = np.inf
         if gap_of(P, k, bx, by, bz) - radius - level < 0:
             high = stop
         elif P[k, BULGES] != 0:
@@ -433,7 +445,7 @@ def first_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radiu
                 leave = enters(P, k, bx, by, bz, ax, ay, az, radius, level)
                 if enter + leave < 1:
                     high = low + 0.5 * (enter + (1 - leave)) * (stop - low)
-        if high == high:
+        if high < np.inf:
             lx, ly, lz = local_at(P, k, high, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h)
             g_high = gap_of(P, k, lx, ly, lz) - radius - level
             if g_high < 0:
@@ -445,6 +457,70 @@ def first_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radiu
         ax, ay, az = bx, by, bz
         low = stop
     return np.inf
+
+
+@njit(forceinline=True, **FLAGS)
+def flat_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius):
+    """first_hit for a flat surface at rest: swept._FlatApproach."""
+    px, py, pz = place_of(P, k, t0)
+    nx, ny, nz = normal_of(P, k, x0, y0, z0)
+    start = gap_of(P, k, x0 - px, y0 - py, z0 - pz) - radius
+    level = min(start, 0.0)
+    start = start - level
+    end = gap_of(P, k, x1 - px, y1 - py, z1 - pz) - radius - level
+    leave, arrive = h * dot3(nx, ny, nz, u0, v0, w0), h * dot3(nx, ny, nz, u1, v1, w1)
+    if not (start + leave / 3 < 0 or end - arrive / 3 < 0 or end < 0):
+        return np.inf
+    rise = end - start
+    square = 3 * rise - (2 * leave + arrive)
+    cube = (leave + arrive) - 2 * rise
+    bend = max(abs(2 * square), abs(2 * square + 6 * cube))
+    chords = chords_for(bend, P[k, NEAR])
+    a, g_low, g_high, b = 0.0, start, end, 1.0
+    for j in range(1, chords + 1):
+        b = min(j / chords, 1.0)
+        g_high = end if b == 1.0 else start + b * (leave + b * (square + b * cube))
+        if g_high < 0:
+            break
+        a, g_low = b, g_high
+    else:
+        return np.inf
+    last = b - a
+    s = a + (b - a) * (g_low / (g_low - g_high))
+    for _ in range(ROOT_STEPS):
+        gap = end if s == 1.0 else start + s * (leave + s * (square + s * cube))
+        slope = leave + s * (2 * square + s * (3 * cube))
+        a, b, s, last, done = narrowed(a, b, s, last, gap, slope)
+        if done:
+            break
+    back = RESOLUTION
+    for _ in range(BACK_STEPS):
+        lx, ly, lz = local_at(P, k, a, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h)
+        if not (gap_of(P, k, lx, ly, lz) - radius - level < 0 and a > 0):
+            break
+        a = max(a - back, 0.0)
+        back = 2 * back
+    return a
+
+
+@njit(**FLAGS)
+def narrowed(a, b, s, last, gap, slope):
+    """A step of swept._root: the bracket, the next place to look, how far it went, and whether that was all."""
+    free, falls = gap >= 0, slope < 0
+    if free:
+        a = s
+    else:
+        b = s
+    step = -gap / (slope if falls else -1.0)
+    arrived = free and falls and step <= 2 * RESOLUTION
+    aim = s + step - RESOLUTION
+    if falls and a < aim and aim < b and abs(step) <= 0.5 * last:
+        s = aim
+        last = abs(step)
+    else:
+        s = 0.5 * (a + b)
+        last = 0.5 * (b - a)
+    return a, b, s, last, arrived or not (b - a > RESOLUTION and a < s < b)
 
 
 @njit(**FLAGS)
@@ -461,27 +537,13 @@ def root(P, k, a, b, g_low, g_high, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, 
         uy = velocity(s, h, y0, v0, y1, v1) - gy
         uz = velocity(s, h, z0, w0, z1, w1) - gz
         slope = dot3(nx, ny, nz, ux, uy, uz) * h
-        free, falls = gap >= 0, slope < 0
-        if free:
-            a = s
-        else:
-            b = s
-        step = -gap / (slope if falls else -1.0)
-        if free and falls and step <= 2 * RESOLUTION:
-            break
-        aim = s + step - RESOLUTION
-        if falls and a < aim and aim < b and abs(step) <= 0.5 * last:
-            s = aim
-            last = abs(step)
-        else:
-            s = 0.5 * (a + b)
-            last = 0.5 * (b - a)
-        if not (b - a > RESOLUTION and a < s < b):
+        a, b, s, last, done = narrowed(a, b, s, last, gap, slope)
+        if done:
             break
     return a
 
 
-@njit(**FLAGS)
+@njit(forceinline=True, **FLAGS)
 def first_hits(P, C, o, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius):
     """Earliest hit of a path, and the surface: ReferenceEngine._first_hits. Surfaces that it stands on are left out."""
     theta, which = np.inf, 0
