@@ -248,12 +248,12 @@ def test_clear_is_never_said_where_something_happens(world, radius):
     assert said[free].all(), "it is of use"
 
 
-def test_compiled_functions_give_the_same_bits():
-    x, v = np.random.default_rng(1).uniform(-1.2, 1.2, (2, 30, 3)) * [[[1]], [[20]]]
-    for solver in (pm.Leapfrog(), pm.ImplicitEuler()):
-        for k in range(len(x)):
-            engines = pair_of_engines(
-                "everything", "swept", solver, x[k], v[k], 0.02, 0.7, lambda: [pm.Gravity((1, -9.81, 0))],
-                lambda text: vars(store.load("contacts", text, "float64")), friction=0.2,
-            )  # fmt: skip
-            same_steps(engines, 1 / 60, 5)
+@pytest.mark.parametrize(("world", "solver"), [("paddle", pm.Leapfrog()), ("block", pm.ImplicitEuler())])
+def test_compiled_functions_give_the_same_bits(world, solver):
+    x, v = np.random.default_rng(1).uniform(-1.2, 1.2, (2, 40, 3)) * [[[1]], [[20]]]
+    for k in range(len(x)):
+        engines = pair_of_engines(
+            world, "swept", solver, x[k], v[k], 0.02, 0.7, lambda: [pm.Gravity((1, -9.81, 0))],
+            lambda text: vars(store.load("contacts", text, "float64")), friction=0.2,
+        )  # fmt: skip
+        same_steps(engines, 1 / 60, 5)

@@ -21,6 +21,7 @@ Mask = NDArray[np.bool_]
 PASSES = 64  # over the contacts of a particle that stands on more than one surface
 SETTLED = 1e-13  # relative change of its contact forces at which the passes end
 STILL = 64.0  # roundings of a velocity: a slower one along a surface is none
+CREEP = 1e-9  # of the speed that counts as resting across a surface: one that is slower along it has been stopped
 NONE = np.zeros(3)
 
 
@@ -216,7 +217,8 @@ class Contacts:
         relative -= rows_dot(relative, stand.normal)[:, None] * stand.normal
         speed = lengths(relative)
         bounce = np.sqrt(2 * surface.eps * stand.load / m[rows])  # across the surface this speed counts as resting
-        speed = np.where(speed > _roundoff(v[rows], motion) + STILL * np.finfo(v.dtype).eps * bounce, speed, 0)
+        creep = max(CREEP, STILL * float(np.finfo(v.dtype).eps)) * bounce
+        speed = np.where(speed > _roundoff(v[rows], motion) + creep, speed, 0)
         stand.speed, stand.slide = speed, directions(relative, speed, NONE)
         v[rows] = np.where((speed == 0)[:, None], motion, v[rows])
         if self.lagged:

@@ -253,7 +253,8 @@ def _constants(order: int, lagged: bool, dtype: str) -> list[str]:
     numbers |= {"NEWTON_STEPS": swept.NEWTON_STEPS, "ROOT_STEPS": swept.ROOT_STEPS, "BACK_STEPS": swept.BACK_STEPS}
     numbers |= {"RESOLUTION": swept.RESOLUTION}
     numbers |= {"MOST_EVENTS": MOST_EVENTS, "EVICTIONS": EVICTIONS, "SETTLED": contact.SETTLED}
-    numbers |= {"ROUND": contact.STILL * float(np.finfo(dtype).eps)}
+    rounding = contact.STILL * float(np.finfo(dtype).eps)
+    numbers |= {"ROUND": rounding, "CREEP": max(contact.CREEP, rounding)}
     return [f"{name} = {value!r}" for name, value in numbers.items()]
 
 

@@ -4,7 +4,7 @@
 `place_of`, `ground_of`, `push_of` (place, velocity and acceleration of a surface in time). Each function does what its
 model in `collisions` or `engine.reference` does to one row, operation by operation; the model says why.
 """
-# ruff: noqa: F821, SIM110
+# ruff: noqa: F821
 # mypy: ignore-errors
 
 import numpy as np
@@ -113,7 +113,7 @@ def choose_slide(P, C, r, t, vx, vy, vz, m, ax, ay, az):
     ux, uy, uz = ux - across * nx, uy - across * ny, uz - across * nz
     speed = length3(ux, uy, uz)
     bounce = np.sqrt(2 * P[k, NEAR] * C[r + LOAD] / m)
-    if not speed > ROUND * (size3(vx, vy, vz) + size3(gx, gy, gz)) + ROUND * bounce:
+    if not speed > ROUND * (size3(vx, vy, vz) + size3(gx, gy, gz)) + CREEP * bounce:
         speed = 0.0
     C[r + SPEED] = speed
     if speed > 0:
