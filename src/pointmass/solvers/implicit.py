@@ -69,7 +69,15 @@ class Implicit(Solver):
         rise = stage - y
         y1 = moved(h, y, stage if self.c == 1.0 else moved(rise, y, y + rise / self.c))
         dense = straight(h, y, y1, system.order == 2)
-        return Step(t, h, y, y1, dense, self._remember(y, length, memory), iterations=iterations, cg_iterations=inner)
+        after = self._remember(y, length, memory)
+        if system.order == 2:
+            velocities = np.arange(len(y)) >= len(y) // 2
+            after = {**after, "rise": moved(h, memory["rise"], np.where(velocities, rise, 0.0))}
+        return Step(t, h, y, y1, dense, after, iterations=iterations, cg_iterations=inner)
+
+    def start(self, system: System) -> Memory:
+        """No step before. The `rise` of the velocities to the last stage is where compiled gradients begin."""
+        return {"rise": np.zeros(system.dim)} if system.order == 2 else {}
 
     def _stage(self, y: Array, h: Array, memory: Memory) -> tuple[Array, Array]:
         """z and gamma, shape (dim,)."""
