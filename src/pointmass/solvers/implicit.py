@@ -19,9 +19,10 @@ class Implicit(Solver):
 
     Parameters
     ----------
-    linear_solver : "cg" for conjugate gradients, "direct" for LU factors, "auto" for what is faster: compiled steps
-        take conjugate gradients, the reference path LU factors, and both agree to the tolerances. Single particles and
-        systems of order 1 are always solved directly.
+    linear_solver : "cg" for conjugate gradients, which leave what is not symmetric (some damping) to Newton's method;
+        "direct" for factors of the matrix, "auto" for what is faster. The reference path takes LU factors, compiled
+        steps eliminate chains and take conjugate gradients for larger islands: both agree to the tolerances. Single
+        particles and systems of order 1 are always solved directly.
     newton : "full" until the equation is solved, "one" for a single linearised step (Baraff and Witkin 1998).
     tolerance : residual of the equation, relative to the size of its terms.
     max_iterations : linear systems for one step.
