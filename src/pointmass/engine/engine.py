@@ -34,6 +34,7 @@ from pointmass.solvers.advance import Stats
 from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.control import control_of
 from pointmass.solvers.explicit import ExplicitRungeKutta
+from pointmass.solvers.implicit import Implicit
 from pointmass.solvers.splitting import Splitting
 from pointmass.system import ParticleSystem
 
@@ -107,8 +108,9 @@ class Engine:
     def missing(self) -> list[str]:
         """What of the system has no kernel."""
         system = self.system
+        kinds = (UnaryForce, ElementForce) if self.solver.implicit else (UnaryForce, ElementForce, PairForce)
         return [
-            *(force.name for force in system.forces if not isinstance(force, (UnaryForce, ElementForce, PairForce))),
+            *(force.name for force in system.forces if not isinstance(force, kinds)),
             *([] if _has_step(self.solver) else [self.solver.name]),
         ]
 
@@ -225,7 +227,8 @@ class Engine:
                 p.x[group.rows], p.v[group.rows] = x.reshape(-1, 3), v.reshape(-1, 3)
         self.farthest, self.fastest = np.max([o.reach for o in outcomes], axis=0).tolist()
         works = [o.stats for o in outcomes]
-        work = Stats(max(w.steps for w in works), sum(w.rejected for w in works), max(w.evaluations for w in works))
+        work = sum(works, Stats())
+        work.steps, work.evaluations = max(w.steps for w in works), max(w.evaluations for w in works)
         self.system.t = span.end
         self.reference.remember(memory, work)
         return True
@@ -363,9 +366,9 @@ def _copied(target: Array, source: Array) -> None:
 
 
 def _has_step(solver: Solver) -> bool:
-    return isinstance(solver, (ExplicitRungeKutta, Splitting))
+    return isinstance(solver, (ExplicitRungeKutta, Splitting, Implicit))
 
 
 def _by_lanes(solver: Solver) -> bool:
     """Whether all take the same steps, so that they can be taken side by side."""
-    return _has_step(solver) and control_of(solver) is None
+    return _has_step(solver) and control_of(solver) is None and not solver.implicit

@@ -18,6 +18,7 @@ from pointmass.engine.adaptive import control_text
 from pointmass.engine.binding import Binder
 from pointmass.engine.forces import Deriv, Incidence, incidence
 from pointmass.engine.impacts import WORK, Impacts
+from pointmass.engine.implicit import implicit_text
 from pointmass.engine.pairs import FULL, PairArrays
 from pointmass.engine.printing import indented
 from pointmass.engine.steps import StepText, step_text
@@ -25,12 +26,14 @@ from pointmass.engine.threads import spread
 from pointmass.solvers.advance import NEARLY, SET_BACKS, Stats
 from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.control import control_of
+from pointmass.solvers.implicit import Implicit
 from pointmass.system import ParticleSystem
 
 CHECKPOINT = 64  # steps after which nothing is remembered of earlier ones but the state, so that a run can go on there
 GRAIN = 256  # particles that are worth a thread
 NOT_FINITE, NO_STEP = 1, 4  # bits of the status of an island
 
+MEMORY = {"warm": ("rise", 1), "x_before": ("y_before", 0), "v_before": ("y_before", 1)}  # in the solver's words
 CONTROL = ("h_next", "error_old", "rejected")  # what the step control remembers of an island
 REACHED = '''@njit(**FLAGS)
 def reached(x, n):
@@ -121,6 +124,8 @@ class IslandKernel:
         return Impacts(deriv.contact, self.system.order, deriv.loop, deriv.flags, deriv.call, *row)
 
     def _step_text(self) -> StepText:
+        if isinstance(self.solver, Implicit):
+            return implicit_text(self.deriv, self.solver)
         depends = self.system.velocity_dependent
         order, loop = self.system.order, self.deriv.loop
         steady = all(force.steady for force in self.system.forces)
@@ -133,10 +138,16 @@ class IslandKernel:
         return [*self.step.work, "x1", "v1", *more]
 
     @property
+    def memory(self) -> list[str]:
+        """Arrays of 3 numbers for each particle that the solver keeps between steps."""
+        return self.step.memory
+
+    @property
     def call(self) -> str:
         """The arguments of `advance`, as text."""
         more = ["known"] * self.step.keeps + ([] if self.impacts is None else ["events", "paid", "when"])
-        return ", ".join([self.deriv.call, "clock, end, x, v", *self.work, *more, "control, done"])
+        arrays = [*self.work, *self.step.scratch, *self.memory, *more]
+        return ", ".join([self.deriv.call, "clock, end, x, v", *arrays, "h_before, control, done"])
 
     @property
     def scratch(self) -> list[str]:
@@ -146,6 +157,7 @@ class IslandKernel:
         lines = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{k + 1}], R)" for k, f in families]
         lines += [f"{name} = np.empty(3 * M[0], R)" for name in self.work]
         lines += ["known = np.zeros(1, np.int64)"] * self.step.keeps
+        lines += [f"{name} = {make}" for name, make in self.step.scratch.items()]
         if contact is not None:
             lines.append(f"K = np.zeros({contact.record} * M[0])")
             lines += [f"{name} = np.zeros(M[0], np.int64)" for name in ("events", "paid")]
@@ -156,7 +168,7 @@ class IslandKernel:
     def functions_text(self) -> str:
         """The functions down to `advance`."""
         deriv, control = self.deriv, control_of(self.solver)
-        parts = [REACHED, deriv.text, "\n\n", self._slope()]
+        parts = [REACHED, deriv.text, "\n\n", self._slope(), self.step.functions]
         if self.impacts is not None:
             parts.append(self.impacts.text)
         if control is not None:
@@ -256,6 +268,9 @@ class IslandKernel:
     def _anew(self) -> list[str]:
         """What the solver remembers is of no use after an impact."""
         control = control_of(self.solver)
+        if self.solver.implicit:
+            loop = [f"for q in {self.deriv.loop}(3 * n):", *(f"    {name}[q] = R(0)" for name in self.memory)]
+            return ["h_before[0] = np.inf", *(loop if self.memory else [])]
         if control is None:
             return ["pass"]
         return [f"control[{k}] = {value!r}" for k, value in enumerate((0.0, control.floor, 0.0))]
@@ -267,14 +282,19 @@ class IslandKernel:
         ranges = [line for j in numbers for line in (f"s{j} = S{j}[island]", f"e{j} = S{j}[island + 1]")]
         lists = [f"K{p.number}[0] = 0" for p in deriv.pairs if p.near]
         lists += ["known[0] = 0"] * (self.step.keeps and bool(lists))
+        lists += ["warm_[:] = R(0)"] if "warm" in self.memory else []
         anew = [f"if (k0 + s) % {CHECKPOINT} == 0:", *indented(lists, 1)] if lists else []
         call = self.call.replace(", x, v, ", ", xi, vi, ")
+        for name in self.memory:
+            call = call.replace(f", {name},", f", {name}_,")
         island = [
             "base = first[island]",
             "n = first[island + 1] - base",
             *ranges,
             "xi = x[3 * base:3 * (base + n)]",
             "vi = v[3 * base:3 * (base + n)]",
+            *(f"{name}_ = {name}[3 * base:3 * (base + n)]" for name in self.memory),
+            "h_before = lengths[island:island + 1]",
             "control = controls[island]",
             "done = work[island]",
             *["known[0] = 0"] * self.step.keeps,
@@ -291,7 +311,7 @@ class IslandKernel:
             "reach[island, 1] = fast",
         ]
         data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers)])
-        grid = "birth, t0, dt, k0, count, controls, work, status, reach"
+        grid = ", ".join([*self.memory, "birth, t0, dt, k0, count, lengths, controls, work, status, reach"])
         loop = [*self.scratch, "for island in range(lo, hi):", *indented(island, 1)]
         head = ["@njit(**FLAGS)", f"def run(lo, hi, first, x, v, {data}, M, {grid}):"]
         return "\n".join([*head, *indented(loop, 1), ""])
@@ -355,11 +375,16 @@ class IslandMembers:
             home = np.searchsorted(self.first, pairs.rows[0], side="right") - 1 if len(pairs.rows) else islands
             starts.append(np.where(np.arange(islands + 1) > home, len(pairs.rows), 0))
         begin = np.full(islands, -np.inf) if births is None else np.maximum.reduceat(births, self.first[:-1])
-        control, work = np.zeros((islands, len(CONTROL))), np.zeros((islands, 3), np.int64)
+        control, work = np.zeros((islands, len(CONTROL))), np.zeros((islands, 5), np.int64)
         if CONTROL[0] in memory:
             control[:] = np.stack([memory[name][self.islands] for name in CONTROL], axis=1)
         status, reach = np.zeros(islands, np.int64), np.zeros((islands, 2))
-        grid = (span.t0, span.dt, span.first, span.count)
+        views = [self._view(memory, *MEMORY[name]) for name in self.kernel.memory]
+        kept = [view[self.rows].astype(dtype).reshape(-1) for view in views]
+        lengths = begin.copy()
+        if "h_before" in memory:
+            lengths = self._view(memory, "h_before", 0)[self.rows[self.first[:-1]], 0]
+        grid = (span.t0, span.dt, span.first, span.count, lengths)
         arrays = (
             self.first,
             x,
@@ -368,6 +393,7 @@ class IslandMembers:
             *contact,
             *starts,
             np.array(most),
+            *kept,
             begin,
             *grid,
             control,
@@ -380,9 +406,19 @@ class IslandMembers:
         for name, column in zip(CONTROL, control.T, strict=True):
             if name in memory:
                 memory[name][self.islands] = column
+        for view, array in zip(views, kept, strict=True):
+            view[self.rows] = array.reshape(-1, 3)
+        if "h_before" in memory:
+            for part in range(self.kernel.system.order):
+                self._view(memory, "h_before", part)[self.rows] = np.repeat(lengths, np.diff(self.first))[:, None]
         steps, evaluations = (int(w) for w in work[:, :2].max(axis=0))
-        stats = Stats(steps, int(work[:, 2].sum()), evaluations)
+        stats = Stats(steps, *(int(w) for w in (work[:, 2].sum(), evaluations, *work[:, 3:].sum(axis=0))))
         if (status & FULL).any():
             for pairs in self.pairs:
                 pairs.enlarge()
         return Outcome(not status.any(), reach.max(axis=0), stats, bool((status == FULL).any()))
+
+    def _view(self, memory: Memory, name: str, part: int) -> Array:
+        """The part of a memory entry that belongs to x or to v, shape (n, 3)."""
+        view: Array = memory[name].reshape(self.kernel.system.order, -1, 3)[part]
+        return view

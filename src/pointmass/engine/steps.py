@@ -27,6 +27,10 @@ class StepText:
     evaluations : of the forces.
     keeps : whether the slope of the end is that of the next beginning, and is used again where `known` says so.
     error : statements that put the error over tolerance into ex and ev, from methods that have one.
+    functions : text of those that the lines call.
+    scratch : further work arrays -> the expressions that make them; M has the largest numbers of particles and of each
+        family's elements of an island.
+    memory : arrays of 3 numbers for each particle that the next step reads.
     """
 
     work: list[str]
@@ -34,6 +38,9 @@ class StepText:
     evaluations: int
     keeps: bool = False
     error: list[str] = field(default_factory=list)
+    functions: str = ""
+    scratch: dict[str, str] = field(default_factory=dict)
+    memory: list[str] = field(default_factory=list)
 
 
 def step_text(

@@ -31,7 +31,7 @@ class BDF2(Implicit):
 
     def start(self, system: System) -> Memory:
         """No history."""
-        return {"y_before": np.zeros(system.dim), "h_before": np.full(system.dim, np.inf)}
+        return {**super().start(system), "y_before": np.zeros(system.dim), "h_before": np.full(system.dim, np.inf)}
 
     def _stage(self, y: Array, h: Array, memory: Memory) -> tuple[Array, Array]:
         ratio = h / memory["h_before"]
@@ -40,6 +40,7 @@ class BDF2(Implicit):
         return z, h * (1.0 + w) / (1.0 + 2.0 * w)
 
     def _remember(self, y: Array, h: Array, memory: Memory) -> Memory:
+        """The start of this step."""
         still = h == 0.0
         return {
             **memory,

@@ -19,9 +19,10 @@ class Implicit(Solver):
 
     Parameters
     ----------
-    linear_solver : "cg" for conjugate gradients, "direct" for LU factors, "auto" for what is faster: compiled steps
-        take conjugate gradients, the reference path LU factors, and both agree to the tolerances. Single particles and
-        systems of order 1 are always solved directly.
+    linear_solver : "cg" for conjugate gradients, which leave what is not symmetric (some damping) to Newton's method;
+        "direct" for factors of the matrix, "auto" for what is faster. The reference path takes LU factors, compiled
+        steps eliminate chains and take conjugate gradients for larger islands: both agree to the tolerances. Single
+        particles and systems of order 1 are always solved directly.
     newton : "full" until the equation is solved, "one" for a single linearised step (Baraff and Witkin 1998).
     tolerance : residual of the equation, relative to the size of its terms.
     max_iterations : linear systems for one step.
@@ -69,7 +70,15 @@ class Implicit(Solver):
         rise = stage - y
         y1 = moved(h, y, stage if self.c == 1.0 else moved(rise, y, y + rise / self.c))
         dense = straight(h, y, y1, system.order == 2)
-        return Step(t, h, y, y1, dense, self._remember(y, length, memory), iterations=iterations, cg_iterations=inner)
+        after = self._remember(y, length, memory)
+        if system.order == 2:
+            velocities = np.arange(len(y)) >= len(y) // 2
+            after = {**after, "rise": moved(h, memory["rise"], np.where(velocities, rise, 0.0))}
+        return Step(t, h, y, y1, dense, after, iterations=iterations, cg_iterations=inner)
+
+    def start(self, system: System) -> Memory:
+        """No step before. The `rise` of the velocities to the last stage is where compiled gradients begin."""
+        return {"rise": np.zeros(system.dim)} if system.order == 2 else {}
 
     def _stage(self, y: Array, h: Array, memory: Memory) -> tuple[Array, Array]:
         """z and gamma, shape (dim,)."""

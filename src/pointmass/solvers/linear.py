@@ -179,7 +179,8 @@ class ConjugateGradients:
     Hestenes and Stiefel, J. Res. NBS 49 (1952), 409; Baraff and Witkin, SIGGRAPH 1998, sec. 5.2.
     """
 
-    restarts: ClassVar[int] = 4  # passes allowed for each unknown of the largest island
+    restarts: ClassVar[int] = 4  # passes allowed for each unknown of an island
+    most: ClassVar[int] = 5000  # passes at all; Newton's method goes on from there
 
     def __init__(self, tolerance: float) -> None:
         self.tolerance = tolerance
@@ -197,7 +198,7 @@ class ConjugateGradients:
         z = precondition @ r
         p, rho = z, total(r * z, islands, n)
         goal, count = self.tolerance**2 * rho, 0
-        for _ in range(self.restarts * int(np.bincount(islands).max())):
+        for _ in range(min(self.restarts * int(np.bincount(islands).max()), self.most)):
             q = symmetric @ p
             curvature = total(p * q, islands, n)
             going = (rho > goal) & (curvature != 0.0)
