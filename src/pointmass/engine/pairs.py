@@ -27,7 +27,7 @@ CHUNK = 64  # particles that one thread takes at a time
 HEAD = 8  # numbers about the list, before the flags of the chunks
 FINE = (4, 1, 1)  # cells to a cut-off and skin along each axis: a row of cells along x is one stretch of the list
 SMALLEST = 1e-9  # cut-off [m], for balls without a radius
-FULL = 8  # status: the list has too little room
+FULL = 16  # status: the list has too little room
 
 Rows = NDArray[np.intp]
 

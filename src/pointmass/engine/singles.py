@@ -298,6 +298,7 @@ class SinglesKernel:
             f"    for i in range({W}):",
             f"        if {waiting} != 0 and i < m:",
             *indented([f"{local} = {entry}" for local, entry in state], 3),
+            *["            known[0] = 0"] * island.step.keeps,
             "            for j in range(k, k + steps):",
             "                clock = t0 + j * dt",
             "                end = t0 + (j + 1) * dt",
@@ -323,7 +324,8 @@ class SinglesKernel:
                 "xi = np.zeros(3, R)",
                 "vi = np.zeros(3, R)",
                 "control = np.zeros(3)",
-                "done = np.zeros(3, np.int64)",
+                "done = np.zeros(5, np.int64)",
+                "h_before = np.full(1, np.inf)",
             ]
             prepared = ["M = np.ones(1, np.int64)", *island.scratch, *own]
             began = [f"s[{6 * W}:{7 * W}] = R(0)"]
