@@ -257,3 +257,26 @@ def test_compiled_functions_give_the_same_bits(world, solver):
             lambda text: vars(store.load("contacts", text, "float64")), friction=0.2,
         )  # fmt: skip
         same_steps(engines, 1 / 60, 5)
+
+
+@pytest.mark.parametrize("solver", ["symplectic_euler", "leapfrog", "rk4", "dopri5", "implicit_euler"])
+def test_linked_particles_in_a_room_some_of_them_pinned(solver, monkeypatch):
+    from types import SimpleNamespace
+
+    monkeypatch.setattr(store, "load", lambda *text: SimpleNamespace(**store.plain(*text)))
+
+    def run(compiled):
+        rng = np.random.default_rng(1)
+        particles = pm.Particles(rng.uniform(-0.9, 0.9, (12, 3)), rng.uniform(-4, 4, (12, 3)), rng.uniform(0.5, 2, 12))
+        particles.pin([3])
+        springs = pm.Springs([(k, k + 1) for k in range(0, 12, 2)], 50.0, 0.5, rest=0.3)
+        room = pm.Box(size=(2, 2, 2), inside=True)
+        system = pm.ParticleSystem(particles, [pm.Gravity(), springs], room)
+        sim = pm.Simulation(system, solver, 1 / 80, compiled=compiled)
+        sim.step(60)
+        return particles
+
+    slow, fast = run(False), run(True)
+    tolerance = 1e-7 if solver in ("implicit_euler", "dopri5") else 1e-11
+    np.testing.assert_allclose(fast.x, slow.x, rtol=0, atol=tolerance)
+    np.testing.assert_allclose(fast.v, slow.v, rtol=0, atol=100 * tolerance)

@@ -129,7 +129,7 @@ class ContactText:
         arguments = f"P, {', '.join(PATH)}, t0, h, radius"
         lines = self.clear_lines("float64", "P")
         third = f"third = h * {1 / 3!r}"
-        body = [*lines.once, *lines.step, third, *lines.lane, f"return {lines.result}"]
+        body = [*lines.once, *lines.step, third, *lines.begin, *lines.lane, *lines.end, f"return {lines.result}"]
         return ["@njit(**FLAGS)", f"def clear({arguments}):", *indented(body, 1), "", ""]
 
     def clear_lines(self, dtype: str, table: str) -> ClearLines:
@@ -139,34 +139,53 @@ class ContactText:
         ----------
         table : name of the array of numbers.
         """
-        lines = ClearLines([], [], [])
-        far = " + ".join(f"abs({p})" for p in PATH[6:9])
-        lines.lane.append(f"size = radius + {literal(ROUNDING[dtype], dtype)} * ({far})")
+        lines = ClearLines()
+        rounding = literal(ROUNDING[dtype], dtype)
+        lines.begin.append(f"size = radius + {rounding} * ({' + '.join(f'abs({p})' for p in PATH[:3])})")
+        lines.end.append(f"size = size + {rounding} * ({' + '.join(f'abs({p})' for p in PATH[6:9])})")
         for k, surface in enumerate(self.surfaces):
-            if "x" not in surface.laws.normal.depends_on and not surface.moves:
+            if not surface.curved and not surface.moves:
                 self._clear_of_plane(k, dtype, table, lines)
-            elif surface.laws.apart is not None and not surface.moves:
+                continue
+            if "safe = True" not in lines.begin:
+                lines.begin.append("safe = True")
+                lines.lane.append(f"far = radius + {rounding} * ({' + '.join(f'abs({p})' for p in PATH[6:9])})")
+                lines.results.append("safe")
+            if surface.laws.apart is not None and not surface.moves:
                 self._clear_by_hull(k, surface.laws.apart, dtype, table, lines)
             else:
                 self._clear_by_distance(k, dtype, table, lines)
         return lines
 
     def _clear_of_plane(self, k: int, dtype: str, table: str, lines: ClearLines) -> None:
-        """The control points of the path, whose hull it does not leave, are all on the free side."""
-        tag, laws = f"q{k}_", self.surfaces[k].laws
+        """The control points of the paths, whose hulls they do not leave, are all on the free side."""
+        tag, surface = f"q{k}_", self.surfaces[k]
+        laws = surface.laws
         lines.once += [f"{tag}{a} = R({table}[{k}, PLACE + {j}])" for j, a in enumerate("xyz")]
         lines.once.append(f"{tag}room = R({table}[{k}, ROOM])")
         numbers = _numbers(lines.once, tag, k, laws.distance, table) | _numbers(lines.once, tag, k, laws.normal, table)
         _, normal = statements(expanded(laws.normal.program), numbers, f"{tag}n_", dtype)
-        gaps = []
-        for j, sign in enumerate("+-"):
-            at = _vector("x", *(f"({a}{j} - {tag}{a})" for a in "xyz"))
-            more, (gap,) = statements(expanded(laws.distance.program), at | numbers, f"{tag}{j}_", dtype)
-            speed = " + ".join(f"{n} * {b}{j}" for n, b in zip(normal, "uvw", strict=True))
-            lines.lane += [*more, f"{tag}e{j} = {gap} {sign} third * ({speed})"]
-            gaps += [gap, f"{tag}e{j}"]
-        lines.lane.append(f"{tag}far = {tag}room + size")
-        lines.results += [f"{gap} > {tag}far" for gap in gaps]
+        origin = _vector("x", *(f"(-{tag}{a})" for a in "xyz"))
+        more, (gap,) = statements(expanded(laws.distance.program), origin | numbers, f"{tag}0_", dtype)
+        lines.once += [*more, f"{tag}gap = {gap}"]
+        value = surface.normal(np.zeros((1, 3)), 0.0)[0].tolist()
+
+        def along(*parts: str) -> str:
+            """The part of a vector along the normal; a plane with faces along the axes needs no products."""
+            terms = [(n, v, p) for n, v, p in zip(normal, value, parts, strict=True) if v != 0]
+            return " + ".join({1.0: p, -1.0: f"(-{p})"}.get(v, f"{n} * {p}") for n, v, p in terms)
+
+        def least(other: str) -> str:
+            return f"{tag}low = {tag}low if {tag}low < {other} else {other}"
+
+        lines.begin += [f"{tag}d = {along('x0', 'y0', 'z0')} + {tag}gap", f"{tag}low = {tag}d"]
+        lines.lane += [
+            f"{tag}e = {tag}d + third * ({along('u0', 'v0', 'w0')})",
+            f"{tag}d = {along('x1', 'y1', 'z1')} + {tag}gap",
+            f"{tag}f = {tag}d - third * ({along('u1', 'v1', 'w1')})",
+            *(least(f"{tag}{p}") for p in "edf"),
+        ]
+        lines.results.append(f"{tag}low > {tag}room + size")
 
     def _clear_by_hull(self, k: int, apart: Traced, dtype: str, table: str, lines: ClearLines) -> None:
         """The hull of the control points is apart from the surface."""
@@ -184,8 +203,7 @@ class ContactText:
         names = {n: points[j] for j, n in enumerate(n for b in range(4) for n in vector_names(f"b{b}"))}
         names |= _numbers(lines.once, tag, k, apart, table) | {"room": f"{tag}far"}
         more, (result,) = statements(expanded(apart.program), names, tag, dtype)
-        lines.lane += [f"{tag}far = {tag}room + size", *more]
-        lines.results.append(f"{result} != R(0)")
+        lines.lane += [f"{tag}far = {tag}room + far", *more, f"safe = safe & ({result} != R(0))"]
 
     def _clear_by_distance(self, k: int, dtype: str, table: str, lines: ClearLines) -> None:
         """The start is farther away than the whole way of particle and surface, and the end is free."""
@@ -208,26 +226,31 @@ class ContactText:
             at = _vector("x", *(f"({a}{j} - {tag}{a}{j})" for a in "xyz"))
             more, (gap,) = statements(expanded(law.program), at | numbers, f"{tag}{j}_", dtype)
             lines.lane += more
-            gaps.append(f"({gap} - size)")
+            gaps.append(f"({gap} - far)")
         wide = literal(1.000001, dtype)
-        lines.results += [f"{gaps[0]} > {tag}near + {wide} * (way + {tag}way)", f"{gaps[1]} > {tag}near"]
+        away = f"({gaps[0]} > {tag}near + {wide} * (way + {tag}way)) & ({gaps[1]} > {tag}near)"
+        lines.lane.append(f"safe = safe & {away}")
 
 
 @dataclass
 class ClearLines:
-    """The statements of `clear`.
+    """The statements of `clear`, for one step or for several in a row.
 
     Attributes
     ----------
     once : of the table alone.
     step : of the time t0 and the length h of a step.
-    lane : of a particle's path x0, y0, z0, u0, ..., w1, its radius, and h/3 by the name of `third`.
-    results : conditions that all hold if it is clear.
+    begin : of the start x0, ..., w0 of the first step and the radius.
+    lane : of a step from x0, ..., w0 to x1, ..., w1, with h/3 by the name of `third`.
+    end : after the last step.
+    results : conditions that all hold if everything was clear.
     """
 
-    once: list[str]
-    step: list[str]
-    lane: list[str]
+    once: list[str] = field(default_factory=list)
+    step: list[str] = field(default_factory=list)
+    begin: list[str] = field(default_factory=list)
+    lane: list[str] = field(default_factory=list)
+    end: list[str] = field(default_factory=list)
     results: list[str] = field(default_factory=list)
 
     @property

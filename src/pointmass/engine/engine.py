@@ -335,7 +335,12 @@ class Engine:
     def _kinds(self) -> tuple[Any, ...]:
         """All that is compiled, and not data."""
         forces = self.system.forces
-        return kinds(forces), bool(self.system.particles.pinned.any()), all(f.enabled for f in forces)
+        return (
+            kinds(forces),
+            tuple(self.system.colliders),
+            bool(self.system.particles.pinned.any()),
+            all(f.enabled for f in forces),
+        )
 
 
 def compiled_by_default() -> bool:

@@ -89,6 +89,8 @@ class Impacts:
             "        when[0] = clock",
             *indented([f"ground[j + {k}] = g{a}" for k, a in enumerate(XYZ)], 1),
             *indented(kept, 1),
+            "else:",
+            *indented([f"p{q}[j + {k}] = {q}[j + {k}]" for q in "xv"[: self.order] for k in range(3)], 1),
         ]
         out = [
             *self.row,

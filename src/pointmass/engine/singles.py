@@ -36,7 +36,7 @@ STATE = 7  # rows of the scratch before the columns: x, v, and who waits
 W = 256  # lanes of a tile
 AXES = "xyz"
 UNROLLED = (4, 1)  # steps that a lane makes in registers
-LONG = 90  # statements of a step that are not unrolled
+LONG = 100  # statements of a step that are not unrolled
 TRANSPOSED = f'''BITS = np.int32 if R is np.float32 else np.int64
 SIZE = BITS(np.iinfo(BITS).max)  # all bits but the sign
 
@@ -214,9 +214,8 @@ class SinglesKernel:
         clear = self._clear()
         step = [*motion.lines]
         if clear is not None:
-            moves = "(w != R(0)) & " if motion.pins else ""
             third = f"third = hr * {literal(1 / 3, motion.dtype)}"
-            step += [third, *self._path(), *clear.lane, f"waits = waits | {moves}(not ({clear.result}))"]
+            step = [*step, third, *self._place(0), *self._place(1), *clear.lane]
         step += [f"{q}_{a} = {q}1_{a}" for q, a in self.state if q == "x"]
         step += [f"{q}_{a} = {motion._free(f'{q}1_{a}')}" for q, a in self.state if q == "v"]
         timed = motion.timed or (clear is not None and bool(clear.step))
@@ -230,16 +229,12 @@ class SinglesKernel:
         contact = None if self.island is None else self.island.deriv.contact
         return None if contact is None else contact.clear_lines(self.motion.dtype, "F")
 
-    def _path(self) -> list[str]:
-        """The path of a lane by the names of `ClearLines`."""
-        radius = self.motion.binder.attribute("radius", LANE)
-        lines = [f"radius = {radius}"]
-        for end, tail in enumerate(("", "1")):
-            for q, letters in (("x", "xyz"), ("v", "uvw")):
-                there = q == "x" or self.system.order == 2
-                lines += [
-                    f"{b}{end} = {f'{q}{tail}_{a}' if there else 'R(0)'}" for a, b in zip(AXES, letters, strict=True)
-                ]
+    def _place(self, end: int) -> list[str]:
+        """The state of a lane at the beginning or the end of a step, by the names of `ClearLines`."""
+        tail, lines = "1" if end else "", []
+        for q, letters in (("x", "xyz"), ("v", "uvw")):
+            for a, b in zip(AXES, letters, strict=True):
+                lines.append(f"{b}{end} = {f'{q}{tail}_{a}' if (q, a) in self.state else 'R(0)'}")
         return lines
 
     def _lanes(self, unrolled: int, step: list[str], clear: ClearLines | None) -> list[str]:
@@ -249,9 +244,14 @@ class SinglesKernel:
         times = [f"t{j}" for j in range(unrolled + 1)]
         waiting = f"s[{6 * W} + i]"
         keep = [f"{entry} = {name}" for name, entry in place.items()]
-        before = []
+        first: list[str] = []
+        last: list[str] = []
         if self.island is not None:
-            before = [f"waits = {waiting} != R(0)"]
+            last = [f"waits = {waiting} != R(0)"]
+            if clear is not None:
+                first = [f"radius = {motion.binder.attribute('radius', LANE)}", *self._place(0), *clear.begin]
+                moves = f"({motion.binder.attribute('w', LANE)} != R(0)) & " if motion.pins else ""
+                last += [*clear.end, f"waits = waits | ({moves}(not ({clear.result})))"]
             keep = [f"{entry} = {entry} if waits else {name}" for name, entry in place.items()]
             keep.append(f"{waiting} = R(1) if waits else R(0)")
         return [
@@ -266,9 +266,9 @@ class SinglesKernel:
             *indented([] if clear is None else [*clear.once, *clear.step], 1),
             f"    for j in range({W}):",
             f"        {LANE} = np.uintp(j)",
-            *indented([*before, *(f"{name} = {entry}" for name, entry in place.items())], 2),
+            *indented([*(f"{name} = {entry}" for name, entry in place.items()), *first], 2),
             *indented([line for j in range(unrolled) for line in (f"hr = h{j}", *step)], 2),
-            *indented(keep, 2),
+            *indented([*last, *keep], 2),
             "    return status",
             "",
             "",
@@ -287,13 +287,16 @@ class SinglesKernel:
         begin = ["clock = max(clock, birth[lo + i])"] if self.births else []
         return [
             "@njit(**FLAGS)",
-            f"def catch_up(s, lo, m, t0, dt, k, steps, birth, {arguments}):",
+            "def somebody_waits(s):",
             "    bits = s.view(BITS)",
-            "    somebody = BITS(0)",
+            "    any_bit = BITS(0)",
             f"    for j in range({W}):",
-            f"        somebody |= bits[np.uintp({6 * W}) + np.uintp(j)]",
-            "    if somebody == 0:",
-            "        return 0",
+            f"        any_bit |= bits[np.uintp({6 * W}) + np.uintp(j)]",
+            "    return any_bit != 0",
+            "",
+            "",
+            "@njit(**FLAGS)",
+            f"def catch_up(s, lo, m, t0, dt, k, steps, birth, {arguments}):",
             "    status = 0",
             f"    for i in range({W}):",
             f"        if {waiting} != 0 and i < m:",
@@ -341,7 +344,10 @@ class SinglesKernel:
         steps = []
         for u in unrolled:
             times = ", ".join(f"t0 + (k + {j}) * dt" for j in range(u + 1))
-            one = [*hold, f"bad |= lanes{u}({shared}, {times})"] + [caught.replace("STEPS", f"{u}")] * bool(caught)
+            one = [*hold, f"bad |= lanes{u}({shared}, {times})"] + [
+                "if somebody_waits(s):",
+                "    " + caught.replace("STEPS", f"{u}"),
+            ] * bool(caught)
             steps += [f"while k + {u} <= k0 + count:", *indented([*one, f"k += {u}"], 1)]
         arrays = [*motion.binder.arrays, *(["F"] if self.system.colliders else [])]
         return [
