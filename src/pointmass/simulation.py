@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pointmass.emitters.emitter import Birth, Emitter
 from pointmass.engine.engine import Engine, compiled_by_default
 from pointmass.engine.island import Span
-from pointmass.engine.threads import spread
+from pointmass.engine.kernels import grow_old
 from pointmass.errors import Diverged, InvalidInput, number, shown, whole_number
 from pointmass.frame import Frame
 from pointmass.laws.arrays import ArrayForce
@@ -28,7 +28,7 @@ from pointmass.system import ParticleSystem
 DEFAULT_DT = 1 / 240  # 60 frames a second with 4 substeps
 RUNAWAY = 1e6  # times the speeds seen so far that are explained: somebody this fast is looked at
 AGREE = 0.1  # of a speed: a step and two half steps that differ by more follow no motion
-AGED_AT_ONCE = 2**17  # particles whose ages stay in the cache
+MANY_AGED = 1e6  # particle-steps, beyond which ages are worth a kernel
 ON_GRID = 1e-9  # of a step: a frame this near to the grid is on it
 
 
@@ -254,25 +254,23 @@ class Simulation:
     def _bear(self, born: Sequence[tuple[int, Birth]], t0: float) -> Array | None:
         """Add the particles that are born from t0 on, each with the number of its emitter; returns the clock of all
         particles, None if all begin at t0."""
+        if not any(len(birth.number) for _, birth in born):
+            return None
         clock = [np.full(len(self.system.particles), t0)]
         for k, birth in born:
             if len(birth.number):
                 self.system.add(birth.x, birth.v, id=birth.ids(k), **birth.columns)
                 clock.append(np.maximum(birth.time, t0))
-        return np.concatenate(clock) if len(clock) > 1 else None
+        return np.concatenate(clock)
 
     def _age(self, span: Span, clock: Array | None) -> None:
         age = self.system.particles.age
-
-        def grow(lo: int, hi: int) -> None:
-            for start in range(lo, hi, AGED_AT_ONCE):
-                rows = slice(start, min(start + AGED_AT_ONCE, hi))
-                for k in range(span.count):
-                    t0, t1 = span.time(k), span.time(k + 1)
-                    lived = t1 - (t0 if clock is None else np.clip(clock[rows], t0, t1))
-                    age[rows] += np.asarray(lived, age.dtype)
-
-        spread(grow, len(age), AGED_AT_ONCE)
+        if clock is None and len(age) * span.count > MANY_AGED:
+            grow_old(age, np.array([span.time(k + 1) - span.time(k) for k in range(span.count)]).astype(age.dtype))
+            return
+        for k in range(span.count):
+            t0, t1 = span.time(k), span.time(k + 1)
+            age += np.asarray(t1 - (t0 if clock is None else np.clip(clock, t0, t1)), age.dtype)
 
     def _bury(self, born: Sequence[tuple[int, Birth]], t1: float) -> None:
         """Take away those whose time has come by t1."""

@@ -53,13 +53,17 @@ class Table:
         """An entry as an expression."""
         return f"{self.name}[{column}, {index}]"
 
+    def beside(self, index: str) -> bool:
+        """Whether numbers are at hand where an index is used."""
+        return False
+
     def array(self, length: int, dtype: Any, order: NDArray[np.intp] | None) -> Array:
         """All columns now, in the order of the kernel's rows."""
         if self._last is None or self._last.shape[1] != length:
             self._last = np.empty((len(self.getters), length), dtype)
         for row, get in zip(self._last, self.getters, strict=True):
             values = get()
-            row[:] = values if order is None else values[order]
+            row[:] = values if order is None or np.ndim(values) == 0 else values[order]
         return self._last
 
 
@@ -109,10 +113,17 @@ class Binder:
     ----------
     columns : where columns of the particles go; its first one is the inverse mass.
     switches : whether forces can be switched off without another kernel.
+    equal : columns that are the same for all particles.
     """
 
-    def __init__(self, particles: Particles, columns: Table, switches: bool = True) -> None:
-        self.switches = switches
+    def __init__(
+        self,
+        particles: Particles,
+        columns: Table,
+        switches: bool = True,
+        equal: frozenset[str] = frozenset(),
+    ) -> None:
+        self.switches, self.equal = switches, equal
         self.particles = particles
         self.dtype = str(particles.dtype)
         self.numbers = Numbers()
@@ -156,9 +167,18 @@ class Binder:
 
     def attribute(self, name: str, index: str) -> str:
         """A column of the particles."""
-        if name == "w":
-            return self.particle.column("w", lambda: self.particles.w, index)
-        return self.particle.column(name, lambda: self.particles.column(name), index)
+        if name in self.equal and self.particle.beside(index):
+            return self.numbers.number(f"all {name}", lambda: float(self._column(name)))
+        return self.particle.column(name, lambda: self._column(name), index)
+
+    def _column(self, name: str) -> Array:
+        """A column, or the number that all have."""
+        p = self.particles
+        if name not in self.equal:
+            return p.w if name == "w" else p.column(name)
+        first = p.column("m" if name == "w" else name)[0]
+        result: Array = 1 / first if name == "w" else first
+        return result
 
     def law(
         self,
@@ -244,6 +264,13 @@ class Binder:
         names = {n: self.attribute(n, index) for n in component.needs} | {"t": f"R({time})"}
         lines, (result,) = statements(program, names, prefix, self.dtype)
         return result, [], lines
+
+
+def equal_columns(particles: Particles) -> frozenset[str]:
+    """Columns that are the same for all particles: masses, inverse masses and radii."""
+    p = particles
+    found = {name for name in ("m", "radius") if len(p) and bool((p.column(name) == p.column(name)[0]).all())}
+    return frozenset(found | {"w"} if "m" in found and not p.pinned.any() else found)
 
 
 def kinds(forces: list[Force]) -> tuple[Any, ...]:

@@ -325,8 +325,9 @@ class Engine:
 
     def _kernel(self, kind: Any, *how: bool) -> Any:
         """The kernel of a kind for the system as it is, printed once."""
-        if self._kernels[0] != self._kinds():
-            self._kernels = (self._kinds(), {})
+        made_of = self._kinds()
+        if self._kernels[0] != made_of:
+            self._kernels = (made_of, {})
         known = self._kernels[1]
         if (kind, *how) not in known:
             known[kind, *how] = kind(self.system, self.solver, *how)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.engine import store
-from pointmass.engine.binding import Binder, Table
+from pointmass.engine.binding import Binder, Table, equal_columns
 from pointmass.engine.contact import ClearLines
 from pointmass.engine.forces import unary
 from pointmass.engine.island import NOT_FINITE, IslandKernel, Outcome, Span
@@ -99,6 +99,9 @@ class Lanes(Table):
     def entry(self, column: int, index: str) -> str:
         return super().entry(column, index) if index != LANE else f"s[{(STATE + column) * W} + {LANE}]"
 
+    def beside(self, index: str) -> bool:
+        return index == LANE
+
 
 class Motion:
     """Prints one step of a solver for one lane, in locals.
@@ -109,10 +112,12 @@ class Motion:
     lines : statements of a lane: from x_x, ..., v_z to x1_x, ..., v1_z.
     """
 
-    def __init__(self, system: ParticleSystem, solver: Solver) -> None:
+    def __init__(self, system: ParticleSystem, solver: Solver, births: bool) -> None:
         self.system, self.solver = system, solver
         self.forces = [force for force in system.forces if isinstance(force, UnaryForce)]
-        self.binder = Binder(system.particles, Lanes("C"), switches=not all(f.enabled for f in system.forces))
+        equal = frozenset() if births else equal_columns(system.particles)
+        switches = not all(force.enabled for force in system.forces)
+        self.binder = Binder(system.particles, Lanes("C"), switches, equal)
         self.dtype = self.binder.dtype
         self.at_time: list[str] = []
         self.lines: list[str] = [f"w = {self.binder.attribute('w', LANE)}"]
@@ -202,7 +207,7 @@ class SinglesKernel:
 
     def __init__(self, system: ParticleSystem, solver: Solver, births: bool) -> None:
         self.system, self.solver, self.births = system, solver, births
-        self.motion = Motion(system, solver)
+        self.motion = Motion(system, solver, births)
         self.island: IslandKernel | None = None
         if births or system.colliders:
             self.island = IslandKernel(system, solver, parallel=False, alone=True, binder=self.motion.binder)
@@ -222,7 +227,7 @@ class SinglesKernel:
         unrolled = [u for u in UNROLLED if u == 1 or not (timed or len(step) > LONG)]
         lanes = [line for u in unrolled for line in self._lanes(u, step, clear)]
         first = motion.binder.functions if island is None else island.functions_text
-        catch_up = [] if island is None else self._catch_up(island)
+        catch_up = [] if island is None else [*self._one_lane(step, clear), *self._catch_up(island)]
         return "\n".join([first, "", TRANSPOSED, *lanes, *catch_up, *self._run(unrolled), ""])
 
     def _clear(self) -> ClearLines | None:
@@ -239,10 +244,50 @@ class SinglesKernel:
 
     def _lanes(self, unrolled: int, step: list[str], clear: ClearLines | None) -> list[str]:
         """The function that makes a few steps of all lanes, with the state in registers in between."""
-        motion = self.motion
-        place = {f"{q}_{a}": f"s[{k * W} + i]" for k, (q, a) in enumerate(self.state)}
         times = [f"t{j}" for j in range(unrolled + 1)]
-        waiting = f"s[{6 * W} + i]"
+        body = self._lane(unrolled, step, clear)
+        return [
+            "@njit(**FLAGS)",
+            f"def lanes{unrolled}({', '.join([*self.shared, *times])}):",
+            *indented(self._head(unrolled, clear), 1),
+            f"    for j in range({W}):",
+            f"        {LANE} = np.uintp(j)",
+            *indented(body, 2),
+            "    return status",
+            "",
+            "",
+        ]
+
+    def _one_lane(self, step: list[str], clear: ClearLines | None) -> list[str]:
+        """The function that makes one step of one lane, and says whether that was clear."""
+        body = self._lane(1, step, clear)
+        return [
+            "@njit(**FLAGS)",
+            f"def lane({LANE}, {', '.join([*self.shared, 't0', 't1'])}):",
+            *indented(self._head(1, clear), 1),
+            *indented(body, 1),
+            "    return not waits and status == 0",
+            "",
+            "",
+        ]
+
+    def _head(self, unrolled: int, clear: ClearLines | None) -> list[str]:
+        """What all lanes have in common."""
+        return [
+            *self.motion.binder.numbers.lines(),
+            *(f"h{j} = R(t{j + 1} - t{j})" for j in range(unrolled)),
+            "t = t0",
+            "h = t1 - t0",
+            "status = 0",
+            *self.motion.at_time,
+            *([] if clear is None else [*clear.once, *clear.step]),
+        ]
+
+    def _lane(self, unrolled: int, step: list[str], clear: ClearLines | None) -> list[str]:
+        """The steps of a lane; one that waits keeps its state."""
+        motion = self.motion
+        place = {f"{q}_{a}": f"s[{k * W} + {LANE}]" for k, (q, a) in enumerate(self.state)}
+        waiting = f"s[{6 * W} + {LANE}]"
         keep = [f"{entry} = {name}" for name, entry in place.items()]
         first: list[str] = []
         last: list[str] = []
@@ -255,23 +300,11 @@ class SinglesKernel:
             keep = [f"{entry} = {entry} if waits else {name}" for name, entry in place.items()]
             keep.append(f"{waiting} = R(1) if waits else R(0)")
         return [
-            "@njit(**FLAGS)",
-            f"def lanes{unrolled}({', '.join([*self.shared, *times])}):",
-            *indented(motion.binder.numbers.lines(), 1),
-            *(f"    h{j} = R(t{j + 1} - t{j})" for j in range(unrolled)),
-            "    t = t0",
-            "    h = t1 - t0",
-            "    status = 0",
-            *indented(motion.at_time, 1),
-            *indented([] if clear is None else [*clear.once, *clear.step], 1),
-            f"    for j in range({W}):",
-            f"        {LANE} = np.uintp(j)",
-            *indented([*(f"{name} = {entry}" for name, entry in place.items()), *first], 2),
-            *indented([line for j in range(unrolled) for line in (f"hr = h{j}", *step)], 2),
-            *indented([*last, *keep], 2),
-            "    return status",
-            "",
-            "",
+            *(f"{name} = {entry}" for name, entry in place.items()),
+            *first,
+            *(line for j in range(unrolled) for line in (f"hr = h{j}", *step)),
+            *last,
+            *keep,
         ]
 
     def _catch_up(self, island: IslandKernel) -> list[str]:
@@ -285,6 +318,8 @@ class SinglesKernel:
             for k in range(3)
         ]
         begin = ["clock = max(clock, birth[lo + i])"] if self.births else []
+        # Most of the steps that somebody waited for are clear after all: only those that are not take the long way.
+        easy = f"clock == t0 + j * dt and lane(np.uintp(i), {', '.join(self.shared)}, clock, end)"
         return [
             "@njit(**FLAGS)",
             "def somebody_waits(s):",
@@ -300,15 +335,16 @@ class SinglesKernel:
             "    status = 0",
             f"    for i in range({W}):",
             f"        if {waiting} != 0 and i < m:",
-            *indented([f"{local} = {entry}" for local, entry in state], 3),
-            *["            known[0] = 0"] * island.step.keeps,
             "            for j in range(k, k + steps):",
             "                clock = t0 + j * dt",
             "                end = t0 + (j + 1) * dt",
             *indented(begin, 4),
-            "                if clock < end and status == 0:",
+            f"                {waiting} = R(0)",
+            f"                if clock < end and status == 0 and not ({easy}):",
+            *indented([f"{local} = {entry}" for local, entry in state], 5),
+            *["                    known[0] = 0"] * island.step.keeps,
             f"                    status = advance({call})",
-            *indented([f"{entry} = {local}" for local, entry in state], 3),
+            *indented([f"{entry} = {local}" for local, entry in state], 5),
             f"        {waiting} = R(0)",
             "    return status",
             "",
