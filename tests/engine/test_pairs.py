@@ -82,7 +82,8 @@ class Kernel:
         place[self.order] = np.arange(len(p))
         binder = Binder(p, Table("C"))
         self.pairs = Pairs(force, 3, binder, parallel)
-        made = (store.plain if plain else store.load)("pairs", self.pairs.text, str(p.dtype))
+        text = self.pairs.text.replace("**FLAGS", "**ENTRY")  # called from Python here
+        made = (store.plain if plain else store.load)("pairs", text, str(p.dtype))
         self.function = (made if plain else vars(made))["pairs3"]
         self.arrays = PairArrays(self.pairs, p, place)
         self.data = binder.data(len(p), self.order)

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from pointmass.cli.kernels import command
 from pointmass.engine import store
 
-TEXT = '@njit(**FLAGS)\ndef twice(a):\n    """Twice a number."""\n    return R(2) * a\n'
+TEXT = '@njit(**ENTRY)\ndef twice(a):\n    """Twice a number."""\n    return R(2) * a\n'
 PROGRAM = f"""
 import logging, sys
 logging.basicConfig(stream=sys.stdout, format="%(message)s")

@@ -313,7 +313,7 @@ class IslandKernel:
         data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers)])
         grid = ", ".join([*self.memory, "birth, t0, dt, k0, count, lengths, controls, work, status, reach"])
         loop = [*self.scratch, "for island in range(lo, hi):", *indented(island, 1)]
-        head = ["@njit(**FLAGS)", f"def run(lo, hi, first, x, v, {data}, M, {grid}):"]
+        head = ["@njit(**ENTRY)", f"def run(lo, hi, first, x, v, {data}, M, {grid}):"]
         return "\n".join([*head, *indented(loop, 1), ""])
 
     @property

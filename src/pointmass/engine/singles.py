@@ -367,7 +367,7 @@ class SinglesKernel:
                 "h_before = np.full(1, np.inf)",
             ]
             prepared = ["M = np.ones(1, np.int64)", *island.scratch, *own]
-            began = [f"s[{6 * W}:{7 * W}] = R(0)"]
+            began = [f"for i in range({W}):", f"    s[{6 * W} + i] = R(0)"]
             arguments = (
                 island.call.replace("base, n, ", "").replace("clock, end, ", "").replace(", x, v, ", ", xi, vi, ")
             )
@@ -387,7 +387,7 @@ class SinglesKernel:
             steps += [f"while k + {u} <= k0 + count:", *indented([*one, f"k += {u}"], 1)]
         arrays = [*motion.binder.arrays, *(["F"] if self.system.colliders else [])]
         return [
-            "@njit(**FLAGS)",
+            "@njit(**ENTRY)",
             f"def run(first, last, x, v, {', '.join(arrays)}, birth, t0, dt, k0, count, status, reach):",
             "    n = len(x) // 3",
             f"    s = np.ones({(STATE + columns) * W}, R)",
@@ -396,7 +396,8 @@ class SinglesKernel:
             f"        lo = tile * {W}",
             f"        m = min({W}, n - lo)",
             *(f"        load(s, {offset}, {q}, lo, m)" for q, offset in copies),
-            *(f"        s[{(STATE + c) * W}:{(STATE + c) * W} + m] = C[{c}, lo:lo + m]" for c in range(columns)),
+            "        for i in range(m):",
+            *(f"            s[{(STATE + c) * W} + i] = C[{c}, lo + i]" for c in range(columns)),
             *indented(began, 2),
             "        bad = 0",
             "        k = k0",

@@ -32,7 +32,8 @@ from numba import njit, prange
 from pointmass.engine.support import exponent, scaled, select, significand
 
 R = np.{dtype}
-FLAGS = {{"error_model": "numpy", "cache": True, "nogil": True{fast}}}
+FLAGS = {{"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True{fast}}}
+ENTRY = {{"error_model": "numpy", "cache": True, "nogil": True{fast}}}  # of what Python calls
 
 '''
 FAST = ', "fastmath": {"contract", "arcp"}'  # never those that assume that there is no NaN, or reorder sums
@@ -63,7 +64,7 @@ def load(title: str, text: str, dtype: str) -> ModuleType:
     Parameters
     ----------
     title : one line that says what it is.
-    text : functions, with the names that the header provides: np, njit, prange, R, FLAGS.
+    text : functions, with the names that the header provides: np, njit, prange, R, FLAGS, ENTRY.
     dtype : "float64" or "float32".
     """
     source = complete(title, text, dtype)
