@@ -16,7 +16,6 @@ from pointmass.engine.island import Span
 from pointmass.engine.kernels import grow_old
 from pointmass.errors import Diverged, InvalidInput, number, shown, whole_number
 from pointmass.frame import Frame
-from pointmass.laws.arrays import ArrayForce
 from pointmass.look import Look, Stage
 from pointmass.particles import Array
 from pointmass.solvers import as_solver
@@ -93,8 +92,8 @@ class Simulation:
         self.steps = 0
         self.frames_seen = 0
         self.engine = Engine(system, self.solver, compiled_by_default() if compiled is None else compiled)
-        if self.engine.wanted:
-            _warn_of_slow(system)
+        for reason in self.engine.missing() if self.engine.wanted else ():
+            warnings.warn(f"this run is not compiled, because {reason}", stacklevel=2)
         self._start = system.get_state()
         self._stage = Stage(self.look, system.particles.x)
         self._looks = self.t0, 0, 1.0  # time of a frame, how many were looked at from it on, and how many in a second
@@ -392,16 +391,6 @@ class Simulation:
             return None
         finally:
             system.set_state(now)
-
-
-def _warn_of_slow(system: ParticleSystem) -> None:
-    for force in system.forces:
-        if isinstance(force, ArrayForce):
-            warnings.warn(
-                f"{force.called} is a NumPy function, so this run is not compiled: a law (pm.unary_force, "
-                "pm.spring_force) would run at the speed of the machine",
-                stacklevel=3,
-            )
 
 
 def culprit(system: ParticleSystem) -> tuple[int, str, bool, list[int]]:

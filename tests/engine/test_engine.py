@@ -263,7 +263,7 @@ def test_laws_that_read_the_age() -> None:
 
 def test_a_numpy_force_runs_and_says_that_it_is_slow() -> None:
     force = pm.array_force(lambda x, v, m, t: -x)
-    with pytest.warns(UserWarning, match="is a NumPy function, so this run is not compiled"):
+    with pytest.warns(UserWarning, match="this run is not compiled, because force .* is a NumPy function"):
         sim = pm.Simulation(pm.ParticleSystem(cloud(), [force]), dt=DT, compiled=True)
     assert not sim.engine.compiled
     sim.step(3)
@@ -283,3 +283,22 @@ def test_a_copy_is_prepared_in_a_thread_while_the_run_goes_on(monkeypatch: pytes
     other.step(3)
     assert running.steps > 0
     assert other.steps == 3
+
+
+def test_lanes_of_single_particles_are_vectors() -> None:
+    if not pytest.importorskip("llvmlite.binding").get_host_cpu_features().get("avx2"):
+        pytest.skip("this machine has no AVX2")
+    floor = pm.Plane((0, -9, 0))
+    still = pm.ParticleSystem(cloud(np.float32), [pm.Gravity(), pm.Drag(0.1)], floor)
+    still.particles.unpin([4])
+    sim = pm.Simulation(still, pm.SymplecticEuler(), DT, compiled=True)
+    sim.step()
+    (members,) = (group.members for group in sim.engine._grouped(None, 0.0))
+    source = store.complete("lanes", members.kernel.text, "float32").replace("**FLAGS", "**ENTRY")
+    scope: dict[str, Any] = {}
+    exec(compile(source.replace('"cache": True', '"cache": False'), "<lanes>", "exec"), scope)
+    members.kernel.__dict__["functions"] = scope
+    sim.step(4)
+    for name in ("lanes4", "lanes1", "load", "keep"):
+        text = "".join(scope[name].inspect_asm().values())
+        assert text.count("%ymm") + text.count("%zmm") > 50, name

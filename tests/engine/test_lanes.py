@@ -133,7 +133,11 @@ def test_vectors(monkeypatch, staged):
         pytest.skip("this machine has no AVX2")
     monkeypatch.setattr(lanes, "UNROLLED", 10 if staged else 10_000)
     kernel = group(strands(70, 5, np.float32), pm.SymplecticEuler())[0].kernel
-    source = store.complete("lanes", kernel.text, kernel.dtype).replace('"cache": True', '"cache": False')
+    source = (
+        store.complete("lanes", kernel.text, kernel.dtype)
+        .replace('"cache": True', '"cache": False')
+        .replace("**FLAGS", "**ENTRY")
+    )
     scope = {}
     exec(compile(source, "<lanes>", "exec"), scope)
     s, g = np.ones(kernel.scratch.rows * kernel.width, np.float32), np.ones(9 * kernel.width, np.float32)

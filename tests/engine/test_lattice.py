@@ -120,7 +120,11 @@ def test_vectors():
     if not pytest.importorskip("llvmlite.binding").get_host_cpu_features().get("avx2"):
         pytest.skip("this machine has no AVX2")
     kernel = group(sheet(70, 81, np.float32), pm.SymplecticEuler()).kernel
-    source = store.complete("lattice", kernel.text, kernel.dtype).replace('"cache": True', '"cache": False')
+    source = (
+        store.complete("lattice", kernel.text, kernel.dtype)
+        .replace('"cache": True', '"cache": False')
+        .replace("**FLAGS", "**ENTRY")
+    )
     scope = {}
     exec(compile(source, "<lattice>", "exec"), scope)
     parts = np.ones((kernel.reach + 4, kernel.scratch(4)), np.float32)

@@ -106,13 +106,18 @@ class Engine:
         return self.wanted and len(self.system.particles) > 0 and not self.missing()
 
     def missing(self) -> list[str]:
-        """What of the system has no kernel."""
-        system = self.system
-        kinds = (UnaryForce, ElementForce) if self.solver.implicit else (UnaryForce, ElementForce, PairForce)
-        return [
-            *(force.name for force in system.forces if not isinstance(force, kinds)),
-            *([] if _has_step(self.solver) else [self.solver.name]),
-        ]
+        """What of the system has no kernel, and what would have: a sentence each."""
+        found = []
+        for force in self.system.forces:
+            if isinstance(force, PairForce) and self.solver.implicit:
+                found.append(f"pairs such as {force.called} have no kernel under {self.solver.name}: use leapfrog")
+            elif not isinstance(force, (UnaryForce, ElementForce, PairForce)):
+                found.append(
+                    f"{force.called} is a NumPy function: use a law, such as pm.unary_force or pm.spring_force"
+                )
+        if not _has_step(self.solver):
+            found.append(f"{self.solver.name} has no kernel: use a solver of pointmass")
+        return found
 
     def start(self) -> Array:
         """dy/dt now, where it may be without pairs of many particles: those take long in NumPy.
