@@ -21,7 +21,7 @@ from pointmass.engine.impacts import WORK, Impacts
 from pointmass.engine.implicit import implicit_text
 from pointmass.engine.pairs import FULL, PairArrays
 from pointmass.engine.printing import indented
-from pointmass.engine.steps import StepText, step_text
+from pointmass.engine.steps import StepText, each, step_text
 from pointmass.engine.threads import spread
 from pointmass.solvers.advance import NEARLY, SET_BACKS, Stats
 from pointmass.solvers.base import Memory, Solver
@@ -182,8 +182,7 @@ class IslandKernel:
         if self.system.order == 2:
             lines = [
                 f"status = deriv({deriv.call}, t, x, v, kv)",
-                f"for q in {deriv.loop}(3 * n):",
-                "    kx[q] = v[q] if C[0, base + q // 3] != 0 else R(0)",
+                *each(deriv.loop, ["kx[q] = v[q] if free else R(0)"]),
                 "return status",
             ]
         head = [f"@njit({deriv.flags})", f"def slope({deriv.call}, t, x, v, kx, kv):"]
@@ -192,8 +191,11 @@ class IslandKernel:
     def _advance(self) -> str:
         """An island from its clock to the end of a step."""
         deriv, second, step = self.deriv, self.system.order == 2, self.step
-        trial = [line.replace("SLOPE(", f"slope({deriv.call}, ") for line in step.lines]
-        keep = ["x[q] = x1[q]"] + ["v[q] = v1[q] if C[0, base + q // 3] != 0 else R(0)"] * second
+        calls = {"SLOPE(": f"slope({deriv.call}, ", "DERIV(": f"deriv({deriv.call}, "}
+        trial = step.lines
+        for name, call in calls.items():
+            trial = [line.replace(name, call) for line in trial]
+        keep = ["x[q] = x1[q]"] + ["v[q] = v1[q] if free else R(0)"] * second
         wanted, judged = ["h = left", "last = True"], []
         if step.error:
             wanted = [
@@ -246,8 +248,7 @@ class IslandKernel:
             f"    done[1] += {step.evaluations}",
             *indented(judged, 1),
             *indented(after, 1),
-            f"    for q in {deriv.loop}(3 * n):",
-            *indented(keep, 2),
+            *indented(each(deriv.loop, keep), 1),
             *indented(beyond, 1),
             "return status",
         ]

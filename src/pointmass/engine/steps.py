@@ -23,7 +23,7 @@ class StepText:
     Attributes
     ----------
     work : names of the arrays that it needs, each of length 3n.
-    lines : statements; the slopes dy/dt = (kx, kv) are written SLOPE(t, x, v, kx, kv).
+    lines : statements; the slopes dy/dt = (kx, kv) are written SLOPE(t, x, v, kx, kv), kv alone DERIV(t, x, v, kv).
     evaluations : of the forces.
     keeps : whether the slope of the end is that of the next beginning, and is used again where `known` says so.
     error : statements that put the error over tolerance into ex and ev, from methods that have one.
@@ -59,6 +59,17 @@ def step_text(
     return _splitting(solver, dtype, loop, velocity_dependent, steady, contacts)
 
 
+def each(loop: str, lines: list[str]) -> list[str]:
+    """Statements for each number q of a particle, which may be `free` or pinned."""
+    return [
+        f"for i in {loop}(n):",
+        "    free = C[np.uintp(0), np.uintp(base + i)] != 0",
+        "    for axis in range(3):",
+        "        q = np.uintp(3 * i) + np.uintp(axis)",
+        *(f"        {line}" for line in lines),
+    ]
+
+
 def _weighted(weights: Sequence[float], slopes: str, dtype: str) -> str:
     """w0 k0[q] + w1 k1[q] + ..., without the terms whose weight is 0."""
     return " + ".join(f"{literal(w, dtype)} * {slopes}{i}[q]" for i, w in enumerate(weights) if w)
@@ -92,22 +103,20 @@ def _splitting(
     solver: Splitting, dtype: str, loop: str, velocity_dependent: bool, steady: bool, contacts: bool
 ) -> StepText:
     keeps = solver.substeps[-1].closing != 0.0 and steady and not velocity_dependent and not contacts
-    start = "status |= SLOPE(t, x, v, kx, kv)"
+    start = "status |= DERIV(t, x, v, kv)"
     lines = [f"for q in {loop}(3 * n):", "    x1[q] = x[q]", "    v1[q] = v[q]"]
     lines += ["if known[0] == 0:", f"    {start}", "known[0] = 1"] if keeps else [start]
     passes = solver.passes if velocity_dependent else 1
     evaluations, fresh = 1, True
     for (opening, drift, closing), (before, after) in zip(solver.substeps, solver._times, strict=True):
         if not fresh or contacts:
-            again = f"status |= SLOPE(t + {before!r} * h, x1, v1, kx, kv)"
+            again = f"status |= DERIV(t + {before!r} * h, x1, v1, kv)"
             lines += [again] if not fresh else ["if standing > 0:", f"    {again}"]
             evaluations += not fresh
         lines += [
             f"kick = {literal(opening, dtype)} * hr",
             f"drift = {literal(drift, dtype)} * hr",
-            f"for q in {loop}(3 * n):",
-            "    v1[q] = v1[q] + kick * kv[q]",
-            "    x1[q] = x1[q] + drift * (v1[q] if C[0, base + q // 3] != 0 else R(0))",
+            *each(loop, ["v1[q] = v1[q] + kick * kv[q]", "x1[q] = x1[q] + drift * (v1[q] if free else R(0))"]),
         ]
         fresh = closing != 0.0 and not velocity_dependent
         if closing != 0.0:
@@ -117,9 +126,9 @@ def _splitting(
                 f"for q in {loop}(3 * n):",
                 "    before[q] = v1[q]",
                 f"for _ in range({count}):",
-                f"    status |= SLOPE(t + {after!r} * h, x1, v1, kx, kv)",
+                f"    status |= DERIV(t + {after!r} * h, x1, v1, kv)",
                 f"    for q in {loop}(3 * n):",
                 "        v1[q] = before[q] + kick * kv[q]",
             ]
             evaluations += passes
-    return StepText(["kx", "kv", "before"], lines, evaluations, keeps)
+    return StepText(["kv", "before"], lines, evaluations, keeps)
