@@ -338,6 +338,18 @@ def _ball_glow(c, box, area, room, ramp, camera):
 
 
 @inner
+def _ball(c, box, area, solid, glows, tile, count, space):
+    camera, offsets, _, ramp = space
+    if solid:
+        return _ball_solid(c, box, area, tile, count, camera, offsets)
+    if not glows:
+        return _ball_soft(c, box, area, tile, count, camera)
+    for k in range(tile[4]):
+        _ball_glow(c, box, area, tile[0][k * BLOCK :], ramp, camera)
+    return count
+
+
+@inner
 def _across(c, dx, dy, inverse, px, py):
     """Where a pixel coordinate lies on a capsule: along it (0 to 1), and the square of how far off its axis.
 
@@ -497,6 +509,18 @@ def _capsule_glow(c, box, area, room, ramp, camera):
 
 
 @inner
+def _capsule(c, box, area, solid, glows, tile, count, space):
+    camera, offsets, _, ramp = space
+    if solid:
+        return _capsule_solid(c, box, area, tile, count, camera, offsets)
+    if not glows:
+        return _capsule_soft(c, box, area, tile, count, camera)
+    for k in range(tile[4]):
+        _capsule_glow(c, box, area, tile[0][k * BLOCK :], ramp, camera)
+    return count
+
+
+@inner
 def _fill(room, even, area, samples, colors):
     """A tile with nothing in it."""
     for row in range(area[2], area[3]):
@@ -613,19 +637,6 @@ def _any_below(items, bound):
 
 
 @inner
-def _round(c, box, area, solid, glows, tile, count, space, draw_solid, draw_soft, draw_glow):
-    """A ball or a capsule, by the three ways to draw its kind."""
-    camera, offsets, _, ramp = space
-    if solid:
-        return draw_solid(c, box, area, tile, count, camera, offsets)
-    if not glows:
-        return draw_soft(c, box, area, tile, count, camera)
-    for k in range(tile[4]):
-        draw_glow(c, box, area, tile[0][k * BLOCK :], ramp, camera)
-    return count
-
-
-@inner
 def _draw_all(items, solid, tables, area, tile, space):
     """The things of a tile, in their order."""
     faces, face_box, balls, ball_box, capsules, capsule_box = tables
@@ -644,11 +655,9 @@ def _draw_all(items, solid, tables, area, tile, space):
         if kind == 0:
             count = _face(faces[i], box, area, solid, tile, count, camera, offsets, steps)
         elif kind == 1:
-            c = balls[i]
-            count = _round(c, box, area, solid, glows, tile, count, space, _ball_solid, _ball_soft, _ball_glow)
+            count = _ball(balls[i], box, area, solid, glows, tile, count, space)
         else:
-            c = capsules[i]
-            count = _round(c, box, area, solid, glows, tile, count, space, _capsule_solid, _capsule_soft, _capsule_glow)
+            count = _capsule(capsules[i], box, area, solid, glows, tile, count, space)
     flush(tile, count)
 
 
