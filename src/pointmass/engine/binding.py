@@ -5,7 +5,7 @@ Which parameters are numbers, columns or functions of time is compiled; their va
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -65,6 +65,42 @@ class Table:
             values = get()
             row[:] = values if order is None or np.ndim(values) == 0 else values[order]
         return self._last
+
+
+class Packed:
+    """Columns of some tables in the order of a fast path, packed anew only when one of them has changed.
+
+    Parameters
+    ----------
+    tables : whose columns, one after the other.
+    orders : for each table, the rows in the order in which the kernel reads them.
+    pack : one array from a column in that order, and how far apart the kernel's parts of it are: 0 if all are equal.
+    """
+
+    def __init__(
+        self,
+        tables: Sequence[Table],
+        orders: Sequence[NDArray[np.intp]],
+        dtype: str,
+        pack: Callable[[Array], tuple[Array, int]],
+    ) -> None:
+        self._columns = [(get, order) for t, order in zip(tables, orders, strict=True) for get in t.getters]
+        self._dtype, self._pack = dtype, pack
+        self._raw: list[Array] | None = None  # columns as they were, in the order of the system
+        self._arrays: tuple[Array, NDArray[np.int64]]
+
+    def arrays(self) -> tuple[Array, NDArray[np.int64]]:
+        """All columns, and where each begins and how far its next part is."""
+        raw = [get() for get, _ in self._columns]
+        if self._raw is None or not all(map(np.array_equal, raw, self._raw)):
+            self._raw = [column.copy() for column in raw]
+            packed = [
+                self._pack(c[order].astype(self._dtype)) for c, (_, order) in zip(raw, self._columns, strict=True)
+            ]
+            begins = np.cumsum([0, *(part.size for part, _ in packed)])
+            where = [place for begin, (_, far) in zip(begins, packed, strict=False) for place in (begin, far)]
+            self._arrays = np.concatenate([part for part, _ in packed]), np.array(where, np.int64)
+        return self._arrays
 
 
 @dataclass

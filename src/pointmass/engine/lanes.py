@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.engine import store
-from pointmass.engine.binding import Binder, Table
+from pointmass.engine.binding import Binder, Packed, Table
 from pointmass.engine.forces import incidence, unary
 from pointmass.engine.island import NOT_FINITE, Array, Outcome, Rows, Span
 from pointmass.engine.phases import REACHED, STATE, entries, phases, regions, simple
@@ -418,15 +418,14 @@ class LanesMembers:
 
     def __init__(self, kernel: LanesKernel, topology: Topology) -> None:
         self.kernel, self.islands = kernel, len(topology.rows)
-        self.orders = [topology.rows, *(f.own for f in topology.families)]
-        self._raw: list[NDArray[Any]] = []  # columns as they were, in the order of the system
-        self._packed: tuple[NDArray[Any], NDArray[np.int64]] | None = None
+        orders = [topology.rows, *(f.own for f in topology.families)]
+        self._columns = Packed(kernel.columns(), orders, kernel.dtype, self._tiles)
 
     def run(self, x: Array, v: Array, births: Array | None, span: Span, memory: Memory) -> Outcome:
         """Advance positions and velocities, shape (3 * rows,), in place."""
         kernel = self.kernel
         elements = [np.ascontiguousarray(kernel.families[j].nodes).ravel() for j in sorted(kernel.staged)]
-        data = (*kernel.binder.common(), *elements, *self._columns())
+        data = (*kernel.binder.common(), *elements, *self._columns.arrays())
         tiles = -(-self.islands // kernel.width)
         status, reach = np.zeros(tiles, np.int64), np.zeros((tiles, 2), x.dtype)
         grid = (span.t0, span.dt, span.first, span.count)
@@ -435,27 +434,11 @@ class LanesMembers:
         work = Stats(span.count, 0, span.count * len(kernel.phases))
         return Outcome(not status.any(), reach.max(axis=0).astype(np.float64), work)
 
-    def _columns(self) -> tuple[NDArray[Any], NDArray[np.int64]]:
-        """All columns by tile, and where each begins and how far its next tile is: 0 if all islands have the same."""
-        tables = self.kernel.columns()
-        raw = [get() for table in tables for get in table.getters]
-        same = len(raw) == len(self._raw) and all(map(np.array_equal, raw, self._raw))
-        if self._packed is None or not same:
-            orders = [order for table, order in zip(tables, self.orders, strict=True) for _ in table.getters]
-            self._raw = [column.copy() for column in raw]
-            self._packed = self._tiles(raw, orders)
-        return self._packed
-
-    def _tiles(self, raw: list[NDArray[Any]], orders: list[Rows]) -> tuple[NDArray[Any], NDArray[np.int64]]:
+    def _tiles(self, values: Array) -> tuple[Array, int]:
+        """A column, shape (islands, length), by tile, and how far the next tile is."""
         width = self.kernel.width
         tiles = -(-self.islands // width)
         lanes = np.minimum(np.arange(tiles * width), self.islands - 1).reshape(tiles, width)
-        parts, where, begin = [], [], 0
-        for column, order in zip(raw, orders, strict=True):
-            values = column[order].astype(self.kernel.dtype)
-            common = bool((values == values[0]).all())
-            part = values[lanes[:1] if common else lanes].transpose(0, 2, 1).ravel()
-            where += [begin, 0 if common else values.shape[1] * width]
-            parts.append(part)
-            begin += len(part)
-        return np.concatenate(parts), np.array(where, np.int64)
+        common = bool((values == values[0]).all())
+        part = values[lanes[:1] if common else lanes].transpose(0, 2, 1).ravel()
+        return part, 0 if common else values.shape[1] * width

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.engine import store
-from pointmass.engine.binding import Binder, Table
+from pointmass.engine.binding import Binder, Packed, Table
 from pointmass.engine.forces import different, unary
 from pointmass.engine.island import Array, Outcome, Rows, Span
 from pointmass.engine.phases import REACHED, STATE, entries, phases, regions, simple
@@ -479,12 +479,11 @@ class LatticeMembers:
 
     def __init__(self, kernel: LatticeKernel, found: Grid) -> None:
         self.kernel, self.grid = kernel, found
-        self.orders = [found.members.reshape(found.m, found.n), *(s.own for s in found.stencils)]
+        orders = [found.members.reshape(found.m, found.n), *(s.own for s in found.stencils)]
+        self._columns = Packed(kernel.columns(), orders, kernel.dtype, self._rows)
         size = 6 * found.m * found.n
         self._state = np.empty(size, kernel.dtype), np.empty(size, kernel.dtype)
         self._work: NDArray[Any] | None = None
-        self._raw: list[NDArray[Any]] = []  # columns as they were, in the order of the system
-        self._packed: tuple[NDArray[Any], NDArray[np.int64]] | None = None
 
     def run(self, x: Array, v: Array, births: Array | None, span: Span, memory: Memory) -> Outcome:
         """Advance positions and velocities, shape (3 * rows,), in place."""
@@ -493,7 +492,7 @@ class LatticeMembers:
         height, work = self._tiles()
         status, reach = np.zeros(len(work), np.int64), np.zeros((m, 2), x.dtype)
         here, there = self._state
-        data = (work, *kernel.binder.common(), *self._columns(), height, m, n, span.t0, span.dt)
+        data = (work, *kernel.binder.common(), *self._columns.arrays(), height, m, n, span.t0, span.dt)
         spread(lambda lo, hi: apart(lo, hi, x, v, here, m, n), m, GRAIN)
         for k in range(span.first, span.first + span.count, kernel.most):
             sweep(here, there, *data, k, min(kernel.most, span.first + span.count - k), status)
@@ -518,27 +517,11 @@ class LatticeMembers:
             self._work = np.zeros((threads, size), kernel.dtype)
         return height, self._work
 
-    def _columns(self) -> tuple[NDArray[Any], NDArray[np.int64]]:
-        """All columns by rows of the grid, and where each begins and how far its next row is: 0 if all are equal."""
-        tables = self.kernel.columns()
-        raw = [get() for table in tables for get in table.getters]
-        same = len(raw) == len(self._raw) and all(map(np.array_equal, raw, self._raw))
-        if self._packed is None or not same:
-            orders = [order for table, order in zip(tables, self.orders, strict=True) for _ in table.getters]
-            self._raw = [column.copy() for column in raw]
-            self._packed = self._rows(raw, orders)
-        return self._packed
-
-    def _rows(self, raw: list[NDArray[Any]], orders: list[Rows]) -> tuple[NDArray[Any], NDArray[np.int64]]:
+    def _rows(self, values: Array) -> tuple[Array, int]:
+        """A column of the corners by rows of the grid, and how far the next row is."""
         m, n = self.grid.m, self.grid.n
-        parts, where, begin = [], [], 0
-        for column, order in zip(raw, orders, strict=True):
-            values = column[order].astype(self.kernel.dtype)
-            common = bool((values == values[0, 0]).all())
-            full = np.full((1 if common else m, n), values[0, 0], values.dtype)
-            if not common:
-                full[: values.shape[0], : values.shape[1]] = values
-            parts.append(full.ravel())
-            where += [begin, 0 if common else n]
-            begin += full.size
-        return np.concatenate(parts), np.array(where, np.int64)
+        common = bool((values == values[0, 0]).all())
+        full = np.full((1 if common else m, n), values[0, 0], values.dtype)
+        if not common:
+            full[: values.shape[0], : values.shape[1]] = values
+        return full.ravel(), 0 if common else n
