@@ -82,7 +82,7 @@ class Kernel:
         place[self.order] = np.arange(len(p))
         binder = Binder(p, Table("C"))
         self.pairs = Pairs(force, 3, binder, parallel)
-        text = self.pairs.text.replace("**FLAGS", "**ENTRY")  # called from Python here
+        text = self.pairs.text.replace("**OWNING", "**ENTRY")  # called from Python here
         made = (store.plain if plain else store.load)("pairs", text, str(p.dtype))
         self.function = (made if plain else vars(made))["pairs3"]
         self.arrays = PairArrays(self.pairs, p, place)

@@ -147,7 +147,7 @@ class Binder:
 
     Parameters
     ----------
-    columns : where columns of the particles go; its first one is the inverse mass.
+    columns : where columns of the particles go; the inverse mass is the first, unless it is the same for all.
     switches : whether forces can be switched off without another kernel.
     equal : columns that are the same for all particles.
     """
@@ -164,7 +164,8 @@ class Binder:
         self.dtype = str(particles.dtype)
         self.numbers = Numbers()
         self.particle = columns
-        self.attribute("w", "")
+        if "w" not in equal:
+            self.attribute("w", "")
         self._grids: list[Grid] = []
         self._lookups: list[GridLookup] = []
 
@@ -203,8 +204,9 @@ class Binder:
 
     def attribute(self, name: str, index: str) -> str:
         """A column of the particles."""
-        if name in self.equal and self.particle.beside(index):
-            return self.numbers.number(f"all {name}", lambda: float(self._column(name)))
+        if name in self.equal:
+            number = self.numbers.number(f"all {name}", lambda: float(self._column(name)))
+            return number if self.particle.beside(index) else f"R(P[{number.removeprefix('p')}])"
         return self.particle.column(name, lambda: self._column(name), index)
 
     def _column(self, name: str) -> Array:

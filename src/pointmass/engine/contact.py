@@ -158,7 +158,8 @@ class ContactText:
         return lines
 
     def _clear_of_plane(self, k: int, dtype: str, table: str, lines: ClearLines) -> None:
-        """The control points of the paths, whose hulls they do not leave, are all on the free side."""
+        """The control points of the paths, whose hulls they do not leave, are all on the free side: the ends, and those
+        that are a third of a step away from an end at its velocity."""
         tag, surface = f"q{k}_", self.surfaces[k]
         laws = surface.laws
         lines.once += [f"{tag}{a} = R({table}[{k}, PLACE + {j}])" for j, a in enumerate("xyz")]
@@ -175,17 +176,13 @@ class ContactText:
             terms = [(n, v, p) for n, v, p in zip(normal, value, parts, strict=True) if v != 0]
             return " + ".join({1.0: p, -1.0: f"(-{p})"}.get(v, f"{n} * {p}") for n, v, p in terms)
 
-        def least(other: str) -> str:
-            return f"{tag}low = {tag}low if {tag}low < {other} else {other}"
-
-        lines.begin += [f"{tag}d = {along('x0', 'y0', 'z0')} + {tag}gap", f"{tag}low = {tag}d"]
+        lines.begin += [f"{tag}low = {along('x0', 'y0', 'z0')}", f"{tag}fast = abs({along('u0', 'v0', 'w0')})"]
         lines.lane += [
-            f"{tag}e = {tag}d + third * ({along('u0', 'v0', 'w0')})",
-            f"{tag}d = {along('x1', 'y1', 'z1')} + {tag}gap",
-            f"{tag}f = {tag}d - third * ({along('u1', 'v1', 'w1')})",
-            *(least(f"{tag}{p}") for p in "edf"),
+            f"{tag}d, {tag}f = {along('x1', 'y1', 'z1')}, abs({along('u1', 'v1', 'w1')})",
+            f"{tag}low = {tag}low if {tag}low < {tag}d else {tag}d",
+            f"{tag}fast = {tag}fast if {tag}fast > {tag}f else {tag}f",
         ]
-        lines.results.append(f"{tag}low > {tag}room + size")
+        lines.results.append(f"{tag}low + {tag}gap - third * {tag}fast > {tag}room + size")
 
     def _clear_by_hull(self, k: int, apart: Traced, dtype: str, table: str, lines: ClearLines) -> None:
         """The hull of the control points is apart from the surface."""

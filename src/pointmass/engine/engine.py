@@ -22,7 +22,7 @@ from pointmass.engine.lanes import LanesKernel, topologies
 from pointmass.engine.lattice import LatticeKernel, grid
 from pointmass.engine.phases import simple
 from pointmass.engine.reference import ReferenceEngine
-from pointmass.engine.singles import SinglesKernel
+from pointmass.engine.singles import SingleMembers, SinglesKernel
 from pointmass.engine.threads import spread
 from pointmass.errors import InvalidInput
 from pointmass.laws.elements import ElementForce
@@ -193,8 +193,12 @@ class Engine:
         p = self.system.particles
         if self._before is None or self._before[0].shape != p.x.shape:
             self._before = np.empty_like(p.x), np.empty_like(p.v)
-        for kept, array in zip(self._before, (p.x, p.v), strict=True):
-            _copied(kept, array)
+        whole = [g.members for g in self._grouped(births, span.start) if g.rows is None]
+        if births is None and not look_inside and len(whole) == 1 and isinstance(whole[0], SingleMembers):
+            whole[0].before = self._before  # in one go with the steps
+        else:
+            for kept, array in zip(self._before, (p.x, p.v), strict=True):
+                _copied(kept, array)
         self._looked = not look_inside
         if look_inside and span.count > 1:
             whole = self._launch(replace(span, count=span.count - 1), births)

@@ -62,6 +62,7 @@ class Deriv:
     families : of elements, in the order of the forces.
     pairs : forces between all particles, or those within a cut-off.
     contact : what the colliders do to a particle, if there are any.
+    flags, once : how functions are compiled, and those that are called at one place only.
 
     Parameters
     ----------
@@ -83,7 +84,8 @@ class Deriv:
         self.families: list[Elements] = []
         self.pairs: list[Pairs] = []
         self.loop = "prange" if parallel else "range"
-        self.flags = "parallel=True, **FLAGS" if parallel else "**FLAGS"
+        self.flags = "parallel=True, **OWNING" if parallel else "**FLAGS"
+        self.once = self.flags if parallel else "forceinline=True, **FLAGS"  # each array is seven arguments of a call
         self._at_time: list[str] = []
         self.text = self._printed()
 

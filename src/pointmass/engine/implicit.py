@@ -76,14 +76,14 @@ class _Printer:
         # Conjugate gradients see the symmetric part of the matrix alone, and one step of Newton's method shows that.
         self.eliminates = self.linked and solver.linear_solver != "cg" and solver.newton == "full"
         blocks = [f"K{f.number}" for f in self.families]
-        self.shared = ", ".join([deriv.call, *blocks, *["Q"] * self.projected])
+        self.shared = ", ".join([deriv.call, *blocks, *["Q", "V"] * self.projected])
 
     def text(self) -> StepText:
         """Everything."""
         scratch = {f"K{f.number}": f"np.empty({f.size} * M[{k + 1}], R)" for k, f in enumerate(self.families)}
         scratch |= {"U": "np.empty(18 * M[0], R)", "part": f"np.empty(M[0] // {BLOCK} + 1)"}
         work = ["gap", "load", "dv", "lack", "rate", "xs", "xt", "vs", "vt", "zx", "zv"]
-        scratch |= {"Q": "np.empty(9 * M[0], R)"} if self.projected else {}
+        scratch |= {"Q": "np.empty(9 * M[0], R)", "V": "np.empty(18 * M[0], R)"} if self.projected else {}
         if self.linked:
             scratch |= dict.fromkeys("HD", "np.empty(6 * M[0], R)")
             work += ["way", "image", "eased", "let"]
@@ -161,7 +161,7 @@ class _Printer:
             assert self.deriv.contact is not None
             first = [
                 f"for i in {self.deriv.loop}(n):",
-                f"    project(F, K, i * {self.deriv.contact.record}, Q[9 * i:9 * i + 9], np.empty(18, Q.dtype))",
+                f"    project(F, K, i * {self.deriv.contact.record}, Q[9 * i:9 * i + 9], V[18 * i:18 * i + 18])",
             ]
         if self.projected and self.linked:
             first += [f"for i in {self.deriv.loop}(n):", *indented(_projected("Q", "gap", "u"), 1)]

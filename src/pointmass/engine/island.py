@@ -121,7 +121,7 @@ class IslandKernel:
         if deriv.contact is None:
             return None
         row = [deriv.binder.attribute(name, "g") for name in ("w", "m", "radius")]
-        return Impacts(deriv.contact, self.system.order, deriv.loop, deriv.flags, deriv.call, *row)
+        return Impacts(deriv.contact, self.system.order, deriv.loop, deriv.once, deriv.call, *row)
 
     def _step_text(self) -> StepText:
         if isinstance(self.solver, Implicit):
@@ -129,7 +129,12 @@ class IslandKernel:
         depends = self.system.velocity_dependent
         order, loop = self.system.order, self.deriv.loop
         steady = all(force.steady for force in self.system.forces)
-        return step_text(self.solver, order, self.dtype, loop, depends, steady, self.impacts is not None)
+        return step_text(self.solver, order, self.dtype, loop, self._w, depends, steady, self.impacts is not None)
+
+    @property
+    def _w(self) -> str:
+        """Inverse mass of particle i."""
+        return self.deriv.binder.attribute("w", "np.uintp(base + i)")
 
     @property
     def work(self) -> list[str]:
@@ -182,7 +187,7 @@ class IslandKernel:
         if self.system.order == 2:
             lines = [
                 f"status = deriv({deriv.call}, t, x, v, kv)",
-                *each(deriv.loop, ["kx[q] = v[q] if free else R(0)"]),
+                *each(deriv.loop, self._w, ["kx[q] = v[q] if free else R(0)"]),
                 "return status",
             ]
         head = [f"@njit({deriv.flags})", f"def slope({deriv.call}, t, x, v, kx, kv):"]
@@ -248,11 +253,11 @@ class IslandKernel:
             f"    done[1] += {step.evaluations}",
             *indented(judged, 1),
             *indented(after, 1),
-            *indented(each(deriv.loop, keep), 1),
+            *indented(each(deriv.loop, self._w, keep), 1),
             *indented(beyond, 1),
             "return status",
         ]
-        return "\n".join([f"@njit({deriv.flags})", f"def advance({self.call}):", *indented(lines, 1), "", "", ""])
+        return "\n".join([f"@njit({deriv.once})", f"def advance({self.call}):", *indented(lines, 1), "", "", ""])
 
     def _begin(self) -> list[str]:
         """At the beginning of a step: nobody has hit anything, and everybody is where the step began."""
@@ -313,9 +318,11 @@ class IslandKernel:
         ]
         data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers)])
         grid = ", ".join([*self.memory, "birth, t0, dt, k0, count, lengths, controls, work, status, reach"])
-        loop = [*self.scratch, "for island in range(lo, hi):", *indented(island, 1)]
-        head = ["@njit(**ENTRY)", f"def run(lo, hi, first, x, v, {data}, M, {grid}):"]
-        return "\n".join([*head, *indented(loop, 1), ""])
+        given = f"lo, hi, first, x, v, {data}, M, {grid}"
+        made = ", ".join(line.split(" = ")[0] for line in self.scratch)
+        islands = ["@njit(**FLAGS)", f"def islands({given}, {made}):", "    for island in range(lo, hi):"]
+        run = ["@njit(**ENTRY)", f"def run({given}):", *indented([*self.scratch, f"islands({given}, {made})"], 1)]
+        return "\n".join([*islands, *indented(island, 2), "", "", *run, ""])
 
     @property
     def title(self) -> str:

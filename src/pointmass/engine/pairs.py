@@ -46,7 +46,7 @@ class Pairs:
     def __init__(self, force: PairForce, number: int, binder: Binder, parallel: bool) -> None:
         self.force, self.number, self.binder = force, number, binder
         self.loop = "prange" if parallel else "range"
-        self.flags = "parallel=True, **FLAGS" if parallel else "**FLAGS"
+        self.flags = "parallel=True, **OWNING" if parallel else "**OWNING"
         self.tile = TILES[parallel]
         self.near = force.reach(binder.particles) is not None
         self.arguments = [f"{a}{number}" for a in ("HWFKLNX" if self.near else "HWF")]

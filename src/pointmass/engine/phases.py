@@ -30,9 +30,7 @@ def reached(s, begin, end):
     most = BITS(0)
     for i in range(begin, end):
         most = max(most, bits[np.uintp(i)] & SIZE)
-    found = np.empty(1, BITS)
-    found[0] = most
-    return found.view(R)[0]
+    return BITS(most).view(R)
 
 
 '''

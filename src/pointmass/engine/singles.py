@@ -34,6 +34,7 @@ GRAIN = 4  # tiles that are worth a thread
 LANE = "i"  # index of a lane
 STATE = 7  # rows of the scratch before the columns: x, v, and who waits
 W = 256  # lanes of a tile
+BUNCH = 32  # lanes of which it is asked in one go whether somebody waits
 AXES = "xyz"
 UNROLLED = (4, 1)  # steps that a lane makes in registers
 LONG = 100  # statements of a step that are not unrolled
@@ -51,9 +52,7 @@ def reached_by(s, offset, m):
         o = np.uintp(offset + {W} * c)
         for j in range(m):
             most = max(most, bits[o + np.uintp(j)] & SIZE)
-    found = np.empty(1, BITS)
-    found[0] = most
-    return found.view(R)[0]
+    return BITS(most).view(R)
 
 
 @njit(**FLAGS)
@@ -262,7 +261,7 @@ class SinglesKernel:
         """The function that makes one step of one lane, and says whether that was clear."""
         body = self._lane(1, step, clear)
         return [
-            "@njit(**FLAGS)",
+            "@njit(forceinline=True, **FLAGS)",
             f"def lane({LANE}, {', '.join([*self.shared, 't0', 't1'])}):",
             *indented(self._head(1, clear), 1),
             *indented(body, 1),
@@ -322,30 +321,34 @@ class SinglesKernel:
         easy = f"clock == t0 + j * dt and lane(np.uintp(i), {', '.join(self.shared)}, clock, end)"
         return [
             "@njit(**FLAGS)",
-            "def somebody_waits(s):",
+            "def somebody_waits(s, first, count):",
             "    bits = s.view(BITS)",
+            f"    o = np.uintp({6 * W} + first)",
             "    any_bit = BITS(0)",
-            f"    for j in range({W}):",
-            f"        any_bit |= bits[np.uintp({6 * W}) + np.uintp(j)]",
+            "    for j in range(count):",
+            "        any_bit |= bits[o + np.uintp(j)]",
             "    return any_bit != 0",
             "",
             "",
             "@njit(**FLAGS)",
             f"def catch_up(s, lo, m, t0, dt, k, steps, birth, {arguments}):",
             "    status = 0",
-            f"    for i in range({W}):",
-            f"        if {waiting} != 0 and i < m:",
-            "            for j in range(k, k + steps):",
-            "                clock = t0 + j * dt",
-            "                end = t0 + (j + 1) * dt",
-            *indented(begin, 4),
-            f"                {waiting} = R(0)",
-            f"                if clock < end and status == 0 and not ({easy}):",
-            *indented([f"{local} = {entry}" for local, entry in state], 5),
-            *["                    known[0] = 0"] * island.step.keeps,
-            f"                    status = advance({call})",
-            *indented([f"{entry} = {local}" for local, entry in state], 5),
-            f"        {waiting} = R(0)",
+            f"    for first in range(0, {W}, {BUNCH}):",
+            f"        if not somebody_waits(s, first, {BUNCH}):",
+            "            continue",
+            f"        for i in range(first, first + {BUNCH}):",
+            f"            if {waiting} != 0 and i < m:",
+            "                for j in range(k, k + steps):",
+            "                    clock = t0 + j * dt",
+            "                    end = t0 + (j + 1) * dt",
+            *indented(begin, 5),
+            f"                    {waiting} = R(0)",
+            f"                    if clock < end and status == 0 and not ({easy}):",
+            *indented([f"{local} = {entry}" for local, entry in state], 6),
+            *["                        known[0] = 0"] * island.step.keeps,
+            f"                        status = advance({call})",
+            *indented([f"{entry} = {local}" for local, entry in state], 6),
+            f"            {waiting} = R(0)",
             "    return status",
             "",
             "",
@@ -381,31 +384,42 @@ class SinglesKernel:
         for u in unrolled:
             times = ", ".join(f"t0 + (k + {j}) * dt" for j in range(u + 1))
             one = [*hold, f"bad |= lanes{u}({shared}, {times})"] + [
-                "if somebody_waits(s):",
+                f"if somebody_waits(s, 0, {W}):",
                 "    " + caught.replace("STEPS", f"{u}"),
             ] * bool(caught)
             steps += [f"while k + {u} <= k0 + count:", *indented([*one, f"k += {u}"], 1)]
         arrays = [*motion.binder.arrays, *(["F"] if self.system.colliders else [])]
+        given = f"first, last, x, v, x_kept, v_kept, {', '.join(arrays)}, birth, t0, dt, k0, count, status, reach"
+        made = [f"s = np.ones({(STATE + columns) * W}, R)", *prepared]
+        names = ", ".join(line.split(" = ")[0] for line in made)
+        own = [f"    s[{(STATE + c) * W} + i] = C[{c}, lo + i]" for c in range(columns)]
+        tile = [
+            f"lo = tile * {W}",
+            f"m = min({W}, len(x) // 3 - lo)",
+            "if len(x_kept) > 0:",
+            "    for q in range(3 * lo, 3 * (lo + m)):",
+            *(f"        {q}_kept[q] = {q}[q]" for q in "xv"),
+            *(f"load(s, {offset}, {q}, lo, m)" for q, offset in copies),
+            *(["for i in range(m):", *own] if own else []),
+            *began,
+            "bad = 0",
+            "k = k0",
+            *steps,
+            *(f"reach[tile, {k}] = reached_by(s, {offset}, m)" for k, (_, offset) in enumerate(copies)),
+            "far = max(reach[tile, 0], reach[tile, 1])",
+            f"status[tile] = bad if far < np.inf else {NOT_FINITE}",
+            *(f"keep(s, {offset}, {q}, lo, m)" for q, offset in copies),
+        ]
         return [
-            "@njit(**ENTRY)",
-            f"def run(first, last, x, v, {', '.join(arrays)}, birth, t0, dt, k0, count, status, reach):",
-            "    n = len(x) // 3",
-            f"    s = np.ones({(STATE + columns) * W}, R)",
-            *indented(prepared, 1),
+            "@njit(**FLAGS)",
+            f"def tiles({given}, {names}):",
             "    for tile in range(first, last):",
-            f"        lo = tile * {W}",
-            f"        m = min({W}, n - lo)",
-            *(f"        load(s, {offset}, {q}, lo, m)" for q, offset in copies),
-            "        for i in range(m):",
-            *(f"            s[{(STATE + c) * W} + i] = C[{c}, lo + i]" for c in range(columns)),
-            *indented(began, 2),
-            "        bad = 0",
-            "        k = k0",
-            *indented(steps, 2),
-            *(f"        reach[tile, {k}] = reached_by(s, {offset}, m)" for k, (_, offset) in enumerate(copies)),
-            "        far = max(reach[tile, 0], reach[tile, 1])",
-            f"        status[tile] = bad if far < np.inf else {NOT_FINITE}",
-            *(f"        keep(s, {offset}, {q}, lo, m)" for q, offset in copies),
+            *indented(tile, 2),
+            "",
+            "",
+            "@njit(**ENTRY)",
+            f"def run({given}):",
+            *indented([*made, f"tiles({given}, {names})"], 1),
             "",
         ]
 
@@ -431,17 +445,19 @@ class SinglesKernel:
         return SingleMembers(self, rows)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class SingleMembers:
     """Particles that are islands of their own.
 
     Attributes
     ----------
     rows : of the particles.
+    before : where the next span is to leave the positions and velocities that it begins with, shape (rows, 3).
     """
 
     kernel: SinglesKernel
     rows: Rows
+    before: tuple[Array, ...] = ()
 
     def run(self, x: Array, v: Array, births: Array | None, span: Span, memory: Memory) -> Outcome:
         """Advance positions and velocities, shape (3 * rows,), in place."""
@@ -452,10 +468,11 @@ class SingleMembers:
         if island is not None and island.deriv.contact is not None:
             data.append(island.deriv.contact.table())
         data.append(np.zeros(0) if births is None else births)
+        kept, self.before = [array.reshape(-1) for array in self.before] or [x[:0], v[:0]], ()
         tiles = -(-count // W)
         status, reach = np.zeros(tiles, np.int64), np.zeros((tiles, 2), x.dtype)
         grid = (span.t0, span.dt, span.first, span.count)
         kernel = self.kernel.functions["run"]
-        spread(lambda lo, hi: kernel(lo, hi, x, v, *data, *grid, status, reach), tiles, GRAIN)
+        spread(lambda lo, hi: kernel(lo, hi, x, v, *kept, *data, *grid, status, reach), tiles, GRAIN)
         work = Stats(span.count, 0, span.count * motion.evaluations)
         return Outcome(not status.any(), reach.max(axis=0).astype(np.float64), work)

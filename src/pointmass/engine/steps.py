@@ -44,26 +44,27 @@ class StepText:
 
 
 def step_text(
-    solver: Solver, order: int, dtype: str, loop: str, velocity_dependent: bool, steady: bool, contacts: bool
+    solver: Solver, order: int, dtype: str, loop: str, w: str, velocity_dependent: bool, steady: bool, contacts: bool
 ) -> StepText:
     """The step of a solver.
 
     Parameters
     ----------
+    w : inverse mass of particle i, as an expression.
     steady : whether forces are the same at all times.
     contacts : whether somebody may be `standing` on a surface: then accelerations depend on velocities.
     """
     if isinstance(solver, ExplicitRungeKutta):
         return _explicit(solver, order, dtype, loop)
     assert isinstance(solver, Splitting)
-    return _splitting(solver, dtype, loop, velocity_dependent, steady, contacts)
+    return _splitting(solver, dtype, loop, w, velocity_dependent, steady, contacts)
 
 
-def each(loop: str, lines: list[str]) -> list[str]:
-    """Statements for each number q of a particle, which may be `free` or pinned."""
+def each(loop: str, w: str, lines: list[str]) -> list[str]:
+    """Statements for each number q of a particle i, which may be `free` or pinned: its inverse mass w is 0."""
     return [
         f"for i in {loop}(n):",
-        "    free = C[np.uintp(0), np.uintp(base + i)] != 0",
+        f"    free = {w} != 0",
         "    for axis in range(3):",
         "        q = np.uintp(3 * i) + np.uintp(axis)",
         *(f"        {line}" for line in lines),
@@ -100,7 +101,7 @@ def _explicit(solver: ExplicitRungeKutta, order: int, dtype: str, loop: str) -> 
 
 
 def _splitting(
-    solver: Splitting, dtype: str, loop: str, velocity_dependent: bool, steady: bool, contacts: bool
+    solver: Splitting, dtype: str, loop: str, w: str, velocity_dependent: bool, steady: bool, contacts: bool
 ) -> StepText:
     keeps = solver.substeps[-1].closing != 0.0 and steady and not velocity_dependent and not contacts
     start = "status |= DERIV(t, x, v, kv)"
@@ -116,7 +117,7 @@ def _splitting(
         lines += [
             f"kick = {literal(opening, dtype)} * hr",
             f"drift = {literal(drift, dtype)} * hr",
-            *each(loop, ["v1[q] = v1[q] + kick * kv[q]", "x1[q] = x1[q] + drift * (v1[q] if free else R(0))"]),
+            *each(loop, w, ["v1[q] = v1[q] + kick * kv[q]", "x1[q] = x1[q] + drift * (v1[q] if free else R(0))"]),
         ]
         fresh = closing != 0.0 and not velocity_dependent
         if closing != 0.0:

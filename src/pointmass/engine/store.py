@@ -32,7 +32,8 @@ from numba import njit, prange
 from pointmass.engine.support import exponent, scaled, select, significand
 
 R = np.{dtype}
-FLAGS = {{"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True{fast}}}
+OWNING = {{"_nrt": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True{fast}}}
+FLAGS = {{**OWNING, "_nrt": False}}  # of what makes no arrays: nobody counts references to those that it is given
 ENTRY = {{"error_model": "numpy", "cache": True, "nogil": True{fast}}}  # of what Python calls
 
 '''
@@ -64,7 +65,7 @@ def load(title: str, text: str, dtype: str) -> ModuleType:
     Parameters
     ----------
     title : one line that says what it is.
-    text : functions, with the names that the header provides: np, njit, prange, R, FLAGS, ENTRY.
+    text : functions, with the names that the header provides: np, njit, prange, R, OWNING, FLAGS, ENTRY.
     dtype : "float64" or "float32".
     """
     source = complete(title, text, dtype)
