@@ -12,7 +12,7 @@ import pytest
 import pointmass as pm
 from pointmass.engine import store
 from pointmass.engine.binding import Binder, Table
-from pointmass.engine.pairs import FULL, PairArrays, Pairs
+from pointmass.engine.pairs import FULL, TILES, PairArrays, Pairs
 
 sys.path.append(str(Path(__file__).parents[1]))
 import naive
@@ -38,7 +38,15 @@ def coulomb(x1, v1, m1, x2, v2, m2, t, k=1.0, charge="charge*(1 + t)"):
     return k * charge[0] * charge[1] * pm.inverse(pm.length(d) ** 3) * d
 
 
+@pm.pair_force
+def drawn_along(x1, v1, m1, x2, v2, m2, t, strength=2.0):
+    """Not the same for both."""
+    weight = strength * m2 * m2 / (1 + pm.dot(x1, x1) * pm.length(x2 - x1))
+    return pm.add(pm.scale(weight, v2), pm.scale(t, x1))
+
+
 CASES = {
+    "drawn along": drawn_along,
     "gravitation": lambda: pm.Gravitation(G="1 + t", eps=0.05),
     "singular": pm.Gravitation,
     "selection": lambda: pm.Gravitation(eps=0.05, on=slice(1, None, 3)),
@@ -122,6 +130,14 @@ def test_text_run_as_plain_python(case: str, dtype: str, tolerance: float, paral
     f = Kernel(force, p, parallel, plain=True)()
     assert f.dtype == p.dtype
     close(f, reference(force, p), tolerance)
+
+
+@pytest.mark.parametrize("count", [1, 8, 20, 27])
+@pytest.mark.parametrize("case", ["gravitation", "singular", "selection", "vortices", "own law", "drawn along"])
+def test_tiles_meet_each_other_once(case: str, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(TILES, True, 8)
+    force, p = CASES[case](), cloud(count, "float64")
+    close(Kernel(force, p, plain=True)(), reference(force, p), 1e-13)
 
 
 def test_equals_the_plain_version_of_the_law() -> None:

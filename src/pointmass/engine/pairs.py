@@ -21,6 +21,7 @@ from pointmass.tracing.trace import trace, vector_names
 TILES = {True: 256, False: 16}  # particles of all pairs whose sums grow side by side: parallel or not
 BLOCK = 256  # partners whose sum is taken in the kernel's precision, before it is added in float64
 UNROLL = 4  # partners for each pass over a tile
+LANES = {"float32": 16, "float64": 8}  # sums of a particle that grow side by side
 SKIN = 0.15  # of the cut-off: how much farther the list of neighbours looks
 PIECE = 256  # neighbours whose numbers are brought together at a time
 CHUNK = 64  # particles that one thread takes at a time
@@ -70,21 +71,26 @@ class Pairs:
         ]
 
     def _all(self) -> str:
-        law, loop, size = self._law, self.loop, self.tile
+        """All threads share one large island and take each pair once; one thread gets islands that are often small."""
+        size, loop = self.tile, self.loop
+        body = [
+            f"n = (m + {size - 1}) // {size} * {size}",
+            f"for i in {loop}(n):",
+            "    g = H[s + min(np.int64(i), m - 1)]",
+            *indented(self._law.copies("n", "i"), 1),
+            *(self._tiles_of_two() if loop == "prange" else self._tile_by_tile()),
+            "return status",
+        ]
+        return "\n".join([*self._head(), *indented(body, 1), ""])
+
+    def _careful(self, first: str, end: str, sums: list[int]) -> list[str]:
+        """Statements that add some partners to the sums of a tile, none to itself."""
+        law, size = self._law, self.tile
         lanes = {q: f"z[{k * size} + l]" for k, q in enumerate(law.first)}
-        sums = [len(law.first) * size + k * size for k in range(law.sums)]
-        width = (len(law.first) + law.sums) * size
-
-        def partner(u: int, j: str) -> list[str]:
-            return [f"b{u}_{k} = W[{law.row(q)} * n + {j}]" for k, q in enumerate(law.second)]
-
-        def pair(u: int) -> tuple[list[str], list[str]]:
-            return law.pair(lanes, {q: f"b{u}_{k}" for k, q in enumerate(law.second)}, f"q{u}_")
-
-        lines, outputs = pair(0)
-        careful = [
-            "for j in range(block, end):",
-            *indented(partner(0, "j"), 1),
+        lines, outputs = law.pair(lanes, {q: f"b_{k}" for k, q in enumerate(law.second)}, "c_")
+        return [
+            f"for j in range({first}, {end}):",
+            *(f"    b_{k} = W[{law.row(q)} * n + j]" for k, q in enumerate(law.second)),
             f"    for l in range({size}):",
             *indented(lines, 2),
             "        other = lo + l != j",
@@ -93,18 +99,25 @@ class Pairs:
                 for a, o in zip(sums, outputs, strict=True)
             ),
         ]
-        many = [pair(u) for u in range(UNROLL)]
-        added = [" + ".join([f"z[{a} + l]", *(many[u][1][k] for u in range(UNROLL))]) for k, a in enumerate(sums)]
+
+    def _tile_by_tile(self) -> list[str]:
+        """Every particle of a tile with all others, block by block."""
+        law, size = self._law, self.tile
+        lanes = {q: f"z[{k * size} + l]" for k, q in enumerate(law.first)}
+        sums = [(len(law.first) + k) * size for k in range(law.sums)]
+
+        many = [law.pair(lanes, {q: f"b{u}_{k}" for k, q in enumerate(law.second)}, f"q{u}_") for u in range(UNROLL)]
+        added = [" + ".join([f"z[{a} + l]", *(outputs[k] for _, outputs in many)]) for k, a in enumerate(sums)]
         plain = [
             f"for j in range(block, end, {UNROLL}):",
-            *indented([line for u in range(UNROLL) for line in partner(u, f"j + {u}")], 1),
+            *(f"    b{u}_{k} = W[{law.row(q)} * n + j + {u}]" for u in range(UNROLL) for k, q in enumerate(law.second)),
             f"    for l in range({size}):",
-            *indented([line for u in range(UNROLL) for line in many[u][0]], 2),
+            *indented([line for lines, _ in many for line in lines], 2),
             *(f"        z[{a} + l] = {text}" for a, text in zip(sums, added, strict=True)),
         ]
         tile = [
             f"lo = np.int64(tile) * {size}",
-            f"z = np.empty({width}, R)",
+            f"z = np.empty({(len(law.first) + law.sums) * size}, R)",
             f"total = np.zeros({law.sums * size})",
             f"for l in range({size}):",
             *(f"    {lanes[q]} = W[{law.row(q)} * n + lo + l]" for q in law.first),
@@ -113,7 +126,7 @@ class Pairs:
             f"    for l in range({law.sums * size}):",
             f"        z[{sums[0]} + l] = R(0)",
             f"    if (block < lo + {size} and lo < end) or end - block < {BLOCK}:",
-            *indented(careful, 2),
+            *indented(self._careful("block", "end", sums), 2),
             "    else:",
             *indented(plain, 2),
             f"    for l in range({law.sums * size}):",
@@ -122,16 +135,80 @@ class Pairs:
             *(f"    sum{k} = R(total[{k * size} + l])" for k in range(law.sums)),
             *indented(law.result("H[s + lo + l]", "lo + l", "n"), 1),
         ]
-        body = [
-            f"n = (m + {size - 1}) // {size} * {size}",
-            f"for i in {loop}(n):",
-            "    g = H[s + min(np.int64(i), m - 1)]",
-            *indented(law.copies("n", "i"), 1),
-            f"for tile in {loop}(n // {size}):",
-            *indented(tile, 1),
-            "return status",
+        return [f"for tile in range(n // {size}):", *indented(tile, 1)]
+
+    def _tiles_of_two(self) -> list[str]:
+        """Every pair once, for both: tiles meet as in a tournament, so that no two threads add to the same tile.
+
+        A few particles of tile a at a time meet all of tile b, a vector lane each. What lane l of b adds to one of a
+        goes to where lane l + `lanes` goes on; so a loop without dependence leaves as many sums as there are lanes.
+        """
+        law, size = self._law, self.tile
+        both = [q for q in law.quantities if q in law.first or q in law.second]
+        lanes = {q: f"y[{k * size} + l]" for k, q in enumerate(both)}
+        sums = [(len(both) + k) * size for k in range(law.sums)]  # of the tile of the lanes
+        width, step = LANES[self.binder.dtype], size + LANES[self.binder.dtype]
+        own = [[sums[-1] + size + (u * law.sums + k) * step for k in range(law.sums)] for u in range(UNROLL)]
+        every = [a for each in own for a in each]
+
+        many = [law.mirrored({q: f"b{u}_{k}" for k, q in enumerate(both)}, lanes, f"q{u}_") for u in range(UNROLL)]
+        alone = [
+            f"lo = np.int64(tile) * {size}",
+            f"z = np.zeros({sums[-1] + size}, R)",
+            f"for l in range({size}):",
+            *(f"    z[{k * size} + l] = W[{law.row(q)} * n + lo + l]" for k, q in enumerate(law.first)),
+            *self._careful("lo", f"min(lo + {size}, m)", sums),
+            f"for l in range({size}):",
+            *(f"    total[{k} * n + lo + l] = z[{a} + l]" for k, a in enumerate(sums)),
         ]
-        return "\n".join([*self._head(), *indented(body, 1), ""])
+        meet = [
+            f"lo = min(a, b) * {size}",
+            f"hi = max(a, b) * {size}",
+            f"many = min({size}, m - hi)",
+            f"z = np.zeros({every[-1] + step}, R)",
+            f"y = z[{size} - many:]",
+            "for l in range(many):",
+            *(f"    {lanes[q]} = W[{law.row(q)} * n + hi + l]" for q in both),
+            f"for i in range(lo, lo + {size}, {UNROLL}):",
+            *(f"    b{u}_{k} = W[{law.row(q)} * n + i + {u}]" for u in range(UNROLL) for k, q in enumerate(both)),
+            f"    for l in range({width}):",
+            *(f"        y[{a} + l] = R(0)" for a in every),
+            "    for l in range(many):",
+            *indented([line for lines, _, _ in many for line in lines], 2),
+            *(
+                f"        y[{a + width} + l] = y[{a} + l] + {o}"
+                for each, (_, outputs, _) in zip(own, many, strict=True)
+                for a, o in zip(each, outputs, strict=True)
+            ),
+            *(
+                f"        y[{a} + l] = {' + '.join([f'y[{a} + l]', *(others[k] for _, _, others in many)])}"
+                for k, a in enumerate(sums)
+            ),
+            *indented(_halves([a + size for a in every], width), 1),
+            *(
+                f"    total[{k} * n + i + {u}] += z[{a + size}]"
+                for u, each in enumerate(own)
+                for k, a in enumerate(each)
+            ),
+            "for l in range(many):",
+            *(f"    total[{k} * n + hi + l] += y[{a} + l]" for k, a in enumerate(sums)),
+        ]
+        return [
+            f"tiles = n // {size}",
+            f"total = np.empty({law.sums} * n)",
+            "for tile in prange(tiles):",
+            *indented(alone, 1),
+            "teams = tiles + tiles % 2",
+            "for turn in range(teams - 1):",
+            "    for table in prange(teams // 2):",
+            "        a = (turn + np.int64(table)) % (teams - 1)",
+            "        b = (turn - np.int64(table)) % (teams - 1) if table > 0 else teams - 1",
+            "        if max(a, b) < tiles:",
+            *indented(meet, 3),
+            "for k in prange(m):",
+            *(f"    sum{k} = R(total[{k} * n + k])" for k in range(law.sums)),
+            *indented(law.result("H[s + k]", "k", "n"), 1),
+        ]
 
     def _near(self) -> str:
         j, law, loop = self.number, self._law, self.loop
@@ -142,7 +219,7 @@ class Pairs:
             if force.box is not None
             else []
         )
-        lanes = 16 if self.binder.dtype == "float32" else 8
+        lanes = LANES[self.binder.dtype]
         inputs = {q: f"z[{k * PIECE} + q]" for k, q in enumerate(law.second)}
         sums = [len(law.second) * PIECE + k * (PIECE + lanes) for k in range(law.sums)]
         width = len(law.second) * PIECE + law.sums * (PIECE + lanes)
@@ -153,7 +230,6 @@ class Pairs:
             f"{inputs[q]} = {inputs[q]} + {side} * np.floor(({own[q]} - {inputs[q]}) * i{side} + R(0.5))"
             for q, side in zip(place, sides, strict=False)
         ]
-        halves = [lanes >> k for k in range(1, lanes.bit_length())]
         particle = [
             *(f"{own[q]} = W[{law.row(q)} * m + k]" for q in law.first),
             "count = np.int64(L[m + k])",
@@ -179,14 +255,7 @@ class Pairs:
             ),
             f"    for l in range({lanes}):",
             *(f"        z[{a} + l] = z[{a} + full + l]" for a in sums),
-            *(
-                line
-                for half in halves
-                for line in (
-                    f"for l in range({half}):",
-                    *(f"    z[{a} + l] = z[{a} + l] + z[{a + half} + l]" for a in sums),
-                )
-            ),
+            *_halves(sums, lanes),
             *(f"sum{k} = z[{a}]" for k, a in enumerate(sums)),
             *law.result("H[s + L[k]]", "k", "m"),
         ]
@@ -375,6 +444,15 @@ class Pairs:
         return [f"@njit({self.flags})", f"def build{self.number}({', '.join(names)}):", *indented(body, 1)]
 
 
+def _halves(sums: list[int], lanes: int) -> list[str]:
+    """Statements that add up the lanes of some sums in z, in pairs."""
+    return [
+        line
+        for half in (lanes >> k for k in range(1, lanes.bit_length()))
+        for line in (f"for l in range({half}):", *(f"    z[{a} + l] = z[{a} + l] + z[{a + half} + l]" for a in sums))
+    ]
+
+
 class _Law:
     """A pair law with its inputs found: numbers that all share, and quantities of each particle, rows of W."""
 
@@ -422,6 +500,19 @@ class _Law:
         sides = {"1": first, "2": second}
         names = {name: sides[node][q] for name, (node, q) in self.inputs.items() if q in sides[node]} | self.common
         return statements(self.program, names, f"{self.tag}{prefix}", self.binder.dtype)
+
+    def mirrored(
+        self, first: dict[str, str], second: dict[str, str], prefix: str
+    ) -> tuple[list[str], list[str], list[str]]:
+        """Statements for one pair, and the outputs for its first and for its second particle."""
+        sides = {"1": first, "2": second}
+        names = {name: sides[node][q] for name, (node, q) in self.inputs.items() if q in sides[node]} | self.common
+        places = {place: name for name, place in self.inputs.items()}
+        other = {name: places["21"["12".index(node)], q] for name, (node, q) in self.inputs.items()}
+        both = expanded(self.program)
+        both.outputs += expanded(self.program, both, other).outputs
+        lines, outputs = statements(both, names, f"{self.tag}{prefix}", self.binder.dtype)
+        return lines, outputs[: self.sums], outputs[self.sums :]
 
     def result(self, row: str, index: str, stride: str) -> list[str]:
         """Statements that write the force on the particle of a row, whose sums are sum0, sum1, ..."""
