@@ -185,7 +185,7 @@ def test_neighbours_are_kept_until_somebody_has_moved_half_the_skin() -> None:
     kernel.force.set(cutoff=0.3)
     kernel.data = kernel.pairs.binder.data(len(p), kernel.order)
     close(kernel(), reference(kernel.force, p), 1e-13)
-    assert head[3] == 3
+    assert kernel.arrays.arrays()[3][3] == 1  # of memory of its own
     assert not np.array_equal(first, kernel())
 
 
@@ -212,9 +212,9 @@ def test_room_grows_before_it_is_full_and_keeps_what_is_known() -> None:
     kernel = Kernel(fluid(cutoff=3.0), p, plain=True)
     before = kernel()
     head = kernel.arrays.arrays()[3]
-    kernel.arrays._reserve(3)
+    kernel.arrays._reserve(8)
     room = head[1]
-    assert head[2] == 19 < room < 24
+    assert head[2] == 24 < room < 30  # 19, in whole vectors
     np.testing.assert_array_equal(kernel(), before)
     assert head[1] > room
     assert head[3] == 1
