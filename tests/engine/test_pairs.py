@@ -132,10 +132,11 @@ def test_text_run_as_plain_python(case: str, dtype: str, tolerance: float, paral
     close(f, reference(force, p), tolerance)
 
 
-@pytest.mark.parametrize("count", [1, 8, 20, 27])
+@pytest.mark.parametrize(("count", "teams"), [(2, 32), (8, 32), (20, 32), (27, 32), (27, 2), (36, 3)])
 @pytest.mark.parametrize("case", ["gravitation", "singular", "selection", "vortices", "own law", "drawn along"])
-def test_tiles_meet_each_other_once(case: str, count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tiles_meet_each_other_once(case: str, count: int, teams: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(TILES, True, 8)
+    monkeypatch.setattr("pointmass.engine.pairs.TEAMS", teams)
     force, p = CASES[case](), cloud(count, "float64")
     close(Kernel(force, p, plain=True)(), reference(force, p), 1e-13)
 

@@ -19,6 +19,7 @@ from pointmass.tracing.columns import expanded
 from pointmass.tracing.trace import trace, vector_names
 
 TILES = {True: 256, False: 16}  # particles of all pairs whose sums grow side by side: parallel or not
+TEAMS = 32  # of tiles, at most: threads wait for each other after each of as many rounds, and half as many can work
 BLOCK = 256  # partners whose sum is taken in the kernel's precision, before it is added in float64
 UNROLL = 4  # partners for each pass over a tile
 LANES = {"float32": 16, "float64": 8}  # sums of a particle that grow side by side
@@ -139,7 +140,7 @@ class Pairs:
         return [f"for tile in range(n // {size}):", *indented(tile, 1)]
 
     def _tiles_of_two(self) -> list[str]:
-        """Every pair once, for both: tiles meet as in a tournament, so that no two threads add to the same tile.
+        """Every pair once, for both: teams of tiles meet as in a tournament, so that no two threads add to one tile.
 
         A few particles of tile a at a time meet all of tile b, a vector lane each. What lane l of b adds to one of a
         goes to where lane l + `lanes` goes on; so a loop without dependence leaves as many sums as there are lanes.
@@ -199,13 +200,20 @@ class Pairs:
             f"total = np.empty({law.sums} * n)",
             "for tile in prange(tiles):",
             *indented(alone, 1),
-            "teams = tiles + tiles % 2",
-            "for turn in range(teams - 1):",
-            "    for table in prange(teams // 2):",
-            "        a = (turn + np.int64(table)) % (teams - 1)",
-            "        b = (turn - np.int64(table)) % (teams - 1) if table > 0 else teams - 1",
-            "        if max(a, b) < tiles:",
-            *indented(meet, 3),
+            f"group = (tiles + {TEAMS - 1}) // {TEAMS}",
+            "teams = (tiles + group - 1) // group",
+            "teams += teams % 2",
+            "for turn in range(teams):",
+            "    for table in prange(teams // 2 if turn > 0 else teams):",
+            "        first = np.int64(table)",
+            "        second = first",
+            "        if turn > 0:",
+            "            first = (turn + np.int64(table)) % (teams - 1)",
+            "            second = (turn - np.int64(table)) % (teams - 1) if table > 0 else teams - 1",
+            "        for a in range(first * group, min((first + 1) * group, tiles)):",
+            "            for b in range(second * group, min((second + 1) * group, tiles)):",
+            "                if first != second or a < b:",
+            *indented(meet, 5),
             "for k in prange(m):",
             *(f"    sum{k} = R(total[{k} * n + k])" for k in range(law.sums)),
             *indented(law.result("H[s + k]", "k"), 1),
