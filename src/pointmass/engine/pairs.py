@@ -309,7 +309,10 @@ class Pairs:
         """The function that sorts the particles into cells and lists the neighbours of each.
 
         In a periodic box the images near its faces are sorted too, so that nobody needs to look across a face: a
-        record is a particle or an image of one, and X has by how much it is moved.
+        record is a particle or an image of one, sorted; `top` is how many there is room for. Stretches of L, each of
+        this length: particle of a record, neighbours of a particle (by its place among the sorted ones), its record,
+        cell of a record not yet sorted, the order, particle of a record not yet sorted (less m: an image); then the
+        begins of the cells. X has positions when the list was made, and by how much images were moved, in both orders.
         """
         law, loop = self._law, self.loop
         sides = ["side0", "side1", "side2"] if periodic else []
@@ -320,7 +323,6 @@ class Pairs:
         ]
         if periodic:
             images = [
-                *(f"h{a} = side{a} * np.floor(x[o + {a}] / side{a})" for a in range(3)),
                 *(
                     f"{end}{a} = {sign}1 if x[o + {a}] - h{a} {test} else 0"
                     for a in range(3)
@@ -343,6 +345,7 @@ class Pairs:
                 "L[5 * top + i] = i",
                 "total += 1",
             ]
+        finite = [f"abs(x[o + {a}]{f' - h{a}' * periodic}) < np.inf" for a in range(3)]
         counts = []
         for a in range(3):
             most = f"max((high{a} - low{a}) / (far / {FINE[a]}) + 1.0, {2 * FINE[a] + 1}.0)"
@@ -432,7 +435,8 @@ class Pairs:
             "total = 0",
             "for i in range(m):",
             "    o = 3 * (H[s + i] - base)",
-            "    if not (abs(x[o]) < np.inf and abs(x[o + 1]) < np.inf and abs(x[o + 2]) < np.inf):",
+            *(f"    h{a} = side{a} * np.floor(x[o + {a}] / side{a})" for a in range(3) if periodic),
+            f"    if not ({' and '.join(finite)}):",
             "        return 1",
             *indented(images, 1),
             "K[4] = total",
