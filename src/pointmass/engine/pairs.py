@@ -5,7 +5,7 @@ Every particle adds up by itself what the others do to it, in an order that depe
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,13 +19,16 @@ from pointmass.tracing.columns import expanded
 from pointmass.tracing.trace import trace, vector_names
 
 TILES = {True: 256, False: 16}  # particles of all pairs whose sums grow side by side: parallel or not
+TEAMS = 32  # of tiles, at most: threads wait for each other after each of as many rounds, and half as many can work
 BLOCK = 256  # partners whose sum is taken in the kernel's precision, before it is added in float64
 UNROLL = 4  # partners for each pass over a tile
+LANES = {"float32": 16, "float64": 8}  # sums of a particle that grow side by side
 SKIN = 0.15  # of the cut-off: how much farther the list of neighbours looks
 PIECE = 256  # neighbours whose numbers are brought together at a time
 CHUNK = 64  # particles that one thread takes at a time
-HEAD = 8  # numbers about the list, before the flags of the chunks
-FINE = (4, 1, 1)  # cells to a cut-off and skin along each axis: a row of cells along x is one stretch of the list
+HEAD = 8  # numbers about the list (known, room, most, how often found, records, room for records), then flags of chunks
+NEAR_LANES = 8  # neighbours of a particle are a multiple of these: sums that grow side by side
+FINE = (3, 1, 1)  # cells to a cut-off and skin along each axis: a row of cells along x is one stretch of the list
 SMALLEST = 1e-9  # cut-off [m], for balls without a radius
 FULL = 16  # status: the list has too little room
 
@@ -70,21 +73,26 @@ class Pairs:
         ]
 
     def _all(self) -> str:
-        law, loop, size = self._law, self.loop, self.tile
+        """All threads share one large island and take each pair once; one thread gets islands that are often small."""
+        size, loop = self.tile, self.loop
+        body = [
+            f"n = (m + {size - 1}) // {size} * {size}",
+            f"for i in {loop}(n):",
+            "    g = H[s + min(np.int64(i), m - 1)]",
+            *indented(self._law.copies("i"), 1),
+            *(self._tiles_of_two() if loop == "prange" else self._tile_by_tile()),
+            "return status",
+        ]
+        return "\n".join([*self._head(), *indented(body, 1), ""])
+
+    def _careful(self, first: str, end: str, sums: list[int]) -> list[str]:
+        """Statements that add some partners to the sums of a tile, none to itself."""
+        law, size = self._law, self.tile
         lanes = {q: f"z[{k * size} + l]" for k, q in enumerate(law.first)}
-        sums = [len(law.first) * size + k * size for k in range(law.sums)]
-        width = (len(law.first) + law.sums) * size
-
-        def partner(u: int, j: str) -> list[str]:
-            return [f"b{u}_{k} = W[{law.row(q)} * n + {j}]" for k, q in enumerate(law.second)]
-
-        def pair(u: int) -> tuple[list[str], list[str]]:
-            return law.pair(lanes, {q: f"b{u}_{k}" for k, q in enumerate(law.second)}, f"q{u}_")
-
-        lines, outputs = pair(0)
-        careful = [
-            "for j in range(block, end):",
-            *indented(partner(0, "j"), 1),
+        lines, outputs = law.pair(lanes, {q: f"b_{k}" for k, q in enumerate(law.second)}, "c_")
+        return [
+            f"for j in range({first}, {end}):",
+            *(f"    b_{k} = {law.entry(q, 'j')}" for k, q in enumerate(law.second)),
             f"    for l in range({size}):",
             *indented(lines, 2),
             "        other = lo + l != j",
@@ -93,45 +101,123 @@ class Pairs:
                 for a, o in zip(sums, outputs, strict=True)
             ),
         ]
-        many = [pair(u) for u in range(UNROLL)]
-        added = [" + ".join([f"z[{a} + l]", *(many[u][1][k] for u in range(UNROLL))]) for k, a in enumerate(sums)]
+
+    def _tile_by_tile(self) -> list[str]:
+        """Every particle of a tile with all others, block by block."""
+        law, size = self._law, self.tile
+        lanes = {q: f"z[{k * size} + l]" for k, q in enumerate(law.first)}
+        sums = [(len(law.first) + k) * size for k in range(law.sums)]
+
+        many = [law.pair(lanes, {q: f"b{u}_{k}" for k, q in enumerate(law.second)}, f"q{u}_") for u in range(UNROLL)]
+        added = [" + ".join([f"z[{a} + l]", *(outputs[k] for _, outputs in many)]) for k, a in enumerate(sums)]
         plain = [
             f"for j in range(block, end, {UNROLL}):",
-            *indented([line for u in range(UNROLL) for line in partner(u, f"j + {u}")], 1),
+            *(f"    b{u}_{k} = {law.entry(q, f'j + {u}')}" for u in range(UNROLL) for k, q in enumerate(law.second)),
             f"    for l in range({size}):",
-            *indented([line for u in range(UNROLL) for line in many[u][0]], 2),
+            *indented([line for lines, _ in many for line in lines], 2),
             *(f"        z[{a} + l] = {text}" for a, text in zip(sums, added, strict=True)),
         ]
         tile = [
             f"lo = np.int64(tile) * {size}",
-            f"z = np.empty({width}, R)",
+            f"z = np.empty({(len(law.first) + law.sums) * size}, R)",
             f"total = np.zeros({law.sums * size})",
             f"for l in range({size}):",
-            *(f"    {lanes[q]} = W[{law.row(q)} * n + lo + l]" for q in law.first),
+            *(f"    {lanes[q]} = {law.entry(q, 'lo + l')}" for q in law.first),
             f"for block in range(0, m, {BLOCK}):",
             f"    end = min(block + {BLOCK}, m)",
             f"    for l in range({law.sums * size}):",
             f"        z[{sums[0]} + l] = R(0)",
             f"    if (block < lo + {size} and lo < end) or end - block < {BLOCK}:",
-            *indented(careful, 2),
+            *indented(self._careful("block", "end", sums), 2),
             "    else:",
             *indented(plain, 2),
             f"    for l in range({law.sums * size}):",
             f"        total[l] = total[l] + z[{sums[0]} + l]",
             f"for l in range(min({size}, m - lo)):",
             *(f"    sum{k} = R(total[{k * size} + l])" for k in range(law.sums)),
-            *indented(law.result("H[s + lo + l]", "lo + l", "n"), 1),
+            *indented(law.result("H[s + lo + l]", "lo + l"), 1),
         ]
-        body = [
-            f"n = (m + {size - 1}) // {size} * {size}",
-            f"for i in {loop}(n):",
-            "    g = H[s + min(np.int64(i), m - 1)]",
-            *indented(law.copies("n", "i"), 1),
-            f"for tile in {loop}(n // {size}):",
-            *indented(tile, 1),
-            "return status",
+        return [f"for tile in range(n // {size}):", *indented(tile, 1)]
+
+    def _tiles_of_two(self) -> list[str]:
+        """Every pair once, for both: teams of tiles meet as in a tournament, so that no two threads add to one tile.
+
+        A few particles of tile a at a time meet all of tile b, a vector lane each. What lane l of b adds to one of a
+        goes to where lane l + `lanes` goes on; so a loop without dependence leaves as many sums as there are lanes.
+        """
+        law, size = self._law, self.tile
+        both = [q for q in law.quantities if q in law.first or q in law.second]
+        lanes = {q: f"y[{k * size} + l]" for k, q in enumerate(both)}
+        sums = [(len(both) + k) * size for k in range(law.sums)]  # of the tile of the lanes
+        width, step = LANES[self.binder.dtype], size + LANES[self.binder.dtype]
+        own = [[sums[-1] + size + (u * law.sums + k) * step for k in range(law.sums)] for u in range(UNROLL)]
+        every = [a for each in own for a in each]
+
+        many = [law.mirrored({q: f"b{u}_{k}" for k, q in enumerate(both)}, lanes, f"q{u}_") for u in range(UNROLL)]
+        alone = [
+            f"lo = np.int64(tile) * {size}",
+            f"z = np.zeros({sums[-1] + size}, R)",
+            f"for l in range({size}):",
+            *(f"    z[{k * size} + l] = {law.entry(q, 'lo + l')}" for k, q in enumerate(law.first)),
+            *self._careful("lo", f"min(lo + {size}, m)", sums),
+            f"for l in range({size}):",
+            *(f"    total[{k} * n + lo + l] = z[{a} + l]" for k, a in enumerate(sums)),
         ]
-        return "\n".join([*self._head(), *indented(body, 1), ""])
+        meet = [
+            f"lo = min(a, b) * {size}",
+            f"hi = max(a, b) * {size}",
+            f"many = min({size}, m - hi)",
+            f"z = np.zeros({every[-1] + step}, R)",
+            f"y = z[{size} - many:]",
+            "for l in range(many):",
+            *(f"    {lanes[q]} = {law.entry(q, 'hi + l')}" for q in both),
+            f"for i in range(lo, lo + {size}, {UNROLL}):",
+            *(f"    b{u}_{k} = {law.entry(q, f'i + {u}')}" for u in range(UNROLL) for k, q in enumerate(both)),
+            f"    for l in range({width}):",
+            *(f"        y[{a} + l] = R(0)" for a in every),
+            "    for l in range(many):",
+            *indented([line for lines, _, _ in many for line in lines], 2),
+            *(
+                f"        y[{a + width} + l] = y[{a} + l] + {o}"
+                for each, (_, outputs, _) in zip(own, many, strict=True)
+                for a, o in zip(each, outputs, strict=True)
+            ),
+            *(
+                f"        y[{a} + l] = {' + '.join([f'y[{a} + l]', *(others[k] for _, _, others in many)])}"
+                for k, a in enumerate(sums)
+            ),
+            *indented(_halves([a + size for a in every], width), 1),
+            *(
+                f"    total[{k} * n + i + {u}] += z[{a + size}]"
+                for u, each in enumerate(own)
+                for k, a in enumerate(each)
+            ),
+            "for l in range(many):",
+            *(f"    total[{k} * n + hi + l] += y[{a} + l]" for k, a in enumerate(sums)),
+        ]
+        return [
+            f"tiles = n // {size}",
+            f"total = np.empty({law.sums} * n)",
+            "for tile in prange(tiles):",
+            *indented(alone, 1),
+            f"group = (tiles + {TEAMS - 1}) // {TEAMS}",
+            "teams = (tiles + group - 1) // group",
+            "teams += teams % 2",
+            "for turn in range(teams):",
+            "    for table in prange(teams // 2 if turn > 0 else teams):",
+            "        first = np.int64(table)",
+            "        second = first",
+            "        if turn > 0:",
+            "            first = (turn + np.int64(table)) % (teams - 1)",
+            "            second = (turn - np.int64(table)) % (teams - 1) if table > 0 else teams - 1",
+            "        for a in range(first * group, min((first + 1) * group, tiles)):",
+            "            for b in range(second * group, min((second + 1) * group, tiles)):",
+            "                if first != second or a < b:",
+            *indented(meet, 5),
+            "for k in prange(m):",
+            *(f"    sum{k} = R(total[{k} * n + k])" for k in range(law.sums)),
+            *indented(law.result("H[s + k]", "k"), 1),
+        ]
 
     def _near(self) -> str:
         j, law, loop = self.number, self._law, self.loop
@@ -142,62 +228,46 @@ class Pairs:
             if force.box is not None
             else []
         )
-        lanes = 16 if self.binder.dtype == "float32" else 8
-        inputs = {q: f"z[{k * PIECE} + q]" for k, q in enumerate(law.second)}
-        sums = [len(law.second) * PIECE + k * (PIECE + lanes) for k in range(law.sums)]
-        width = len(law.second) * PIECE + law.sums * (PIECE + lanes)
+        inputs = {q: f"y[4 * q + {a}]" for a, q in enumerate(law.packed)}
+        more = [q for q in law.second if q not in law.packed]
+        inputs |= {q: f"y[{(4 + k) * PIECE} + q]" for k, q in enumerate(more)}
+        step = PIECE + NEAR_LANES
+        sums = [k * step for k in range(law.sums)]
         own = {q: f"a{k}" for k, q in enumerate(law.first)}
         lines, outputs = law.pair(own, inputs, "q_")
-        place = vector_names("x")
-        images = [
-            f"{inputs[q]} = {inputs[q]} + {side} * np.floor(({own[q]} - {inputs[q]}) * i{side} + R(0.5))"
-            for q, side in zip(place, sides, strict=False)
-        ]
-        halves = [lanes >> k for k in range(1, lanes.bit_length())]
         particle = [
-            *(f"{own[q]} = W[{law.row(q)} * m + k]" for q in law.first),
-            "count = np.int64(L[m + k])",
-            "at = k * room",
-            f"for l in range({lanes}):",
-            *(f"    z[{a} + l] = R(0)" for a in sums),
-            f"for piece in range(0, count, {PIECE}):",
-            f"    many = min({PIECE}, count - piece)",
-            f"    full = (many + {lanes - 1}) // {lanes} * {lanes}",
+            "k = np.int64(L[2 * top + r])",
+            *(f"{own[q]} = {law.entry(q, 'k')}" for q in law.first),
+            *(f"sum{k} = R(0)" for k in range(law.sums)),
+            f"for piece in range(r * room, r * room + np.int64(L[top + r]), {PIECE}):",
+            f"    many = min({PIECE}, r * room + np.int64(L[top + r]) - piece)",
             "    for q in range(many):",
-            "        b = np.uintp(N[np.uintp(at + piece + q)])",
-            *(f"        {inputs[q]} = W[np.uintp({law.row(q)} * m) + b]" for q in law.second),
-            "    for q in range(many, full):",
-            *(f"        {inputs[q]} = {'R(np.inf)' if q in place else 'R(0)'}" for q in law.second),
-            *indented(["if L[2 * m + k] != 0:", "    for q in range(full):", *indented(images, 2)] if sides else [], 1),
-            "    for q in range(full):",
+            "        b = np.uintp(N[np.uintp(piece + q)])",
+            # all four before one is written: then they move as one vector
+            *(f"        b{a} = W[np.uintp(4) * b + np.uintp({a})]" for a in range(4)),
+            *(f"        y[np.uintp(4 * q + {a})] = b{a}" for a in range(4)),
+            *(f"        {inputs[q]} = {law.entry(q, 'b')}" for q in more),
+            f"    u = z[{PIECE} - many:]",
+            f"    for l in range({NEAR_LANES}):",
+            *(f"        u[{a} + l] = R(0)" for a in sums),
+            "    for q in range(many):",
             *indented(lines, 2),
-            *(f"        d{a} = {own[q]} - {inputs[q]}" for a, q in enumerate(place)),
-            "        near = d0 * d0 + d1 * d1 + d2 * d2 < cut2",
+            *(f"        d{a} = {own[q]} - {inputs[q]}" for a, q in enumerate(vector_names("x"))),
+            f"        near = d0 * d0 + d1 * d1 + d2 * d2 < {'cut2' if len(law.packed) == 4 else 'y[4 * q + 3]'}",
             *(
-                f"        z[{a + lanes} + q] = z[{a} + q] + ({o} if near else R(0))"
+                f"        u[{a + NEAR_LANES} + q] = u[{a} + q] + ({o} if near else R(0))"
                 for a, o in zip(sums, outputs, strict=True)
             ),
-            f"    for l in range({lanes}):",
-            *(f"        z[{a} + l] = z[{a} + full + l]" for a in sums),
-            *(
-                line
-                for half in halves
-                for line in (
-                    f"for l in range({half}):",
-                    *(f"    z[{a} + l] = z[{a} + l] + z[{a + half} + l]" for a in sums),
-                )
-            ),
-            *(f"sum{k} = z[{a}]" for k, a in enumerate(sums)),
-            *law.result("H[s + L[k]]", "k", "m"),
+            *indented(_halves([a + PIECE for a in sums], NEAR_LANES), 1),
+            *(f"    sum{k} = sum{k} + z[{a + PIECE}]" for k, a in enumerate(sums)),
+            *law.result("H[s + L[k]]", "k"),
         ]
         copy = [
             "moved = 0",
-            f"for k in range(np.int64(chunk) * {CHUNK}, min(m, (np.int64(chunk) + 1) * {CHUNK})):",
+            f"for k in range(np.int64(chunk) * {CHUNK}, min(total, (np.int64(chunk) + 1) * {CHUNK})):",
             "    g = H[np.uintp(s + L[k])]",
-            *indented(law.copies("m", "k"), 1),
-            *(f"    r{a} = np.uintp({a} * m + k)" for a in range(3)),
-            *(f"    W[r{a}] = W[r{a}] - X[np.uintp(3 * m) + r{a}]" for a in range(3) if sides),
-            *(f"    d{a} = W[r{a}] - X[r{a}]" for a in range(3)),
+            *indented(law.copies("k", [f" - X[np.uintp({3 + a} * top + k)]" if sides else "" for a in range(3)]), 1),
+            *(f"    d{a} = {law.entry(q, 'k')} - X[np.uintp({a} * top + k)]" for a, q in enumerate(vector_names("x"))),
             "    if not d0 * d0 + d1 * d1 + d2 * d2 <= slack2:",
             "        moved = 1",
             f"K[{HEAD} + chunk] = moved",
@@ -206,9 +276,9 @@ class Pairs:
         body = [
             f"cut2 = {reach} * {reach}",
             f"slack2 = R({0.5 * SKIN} * {0.5 * SKIN}) * cut2",
-            *(f"i{side} = R(1) / {side}" for side in sides),
             "room = K[1]",
-            f"chunks = (m + {CHUNK - 1}) // {CHUNK}",
+            "top = K[5]",
+            "n = top + 1",
             "for turn in range(2):",
             "    if K[0] == 0:",
             f"        problem = {build}",
@@ -217,6 +287,8 @@ class Pairs:
             "                F[3 * H[s + k // 3] + k % 3] = R(np.nan)",
             "        if problem != 0:",
             "            return problem if problem != 1 else status",
+            "    total = K[4]",
+            f"    chunks = (total + {CHUNK - 1}) // {CHUNK}",
             f"    for chunk in {loop}(chunks):",
             *indented(copy, 2),
             "    for chunk in range(chunks):",
@@ -224,148 +296,201 @@ class Pairs:
             "            K[0] = 0",
             "    if K[0] != 0:",
             "        break",
-            f"for chunk in {loop}(chunks):",
-            f"    z = np.empty({width}, R)",
-            f"    for k in range(np.int64(chunk) * {CHUNK}, min(m, (np.int64(chunk) + 1) * {CHUNK})):",
+            f"for chunk in {loop}((m + {CHUNK - 1}) // {CHUNK}):",
+            f"    y = np.empty({(4 + len(more)) * PIECE}, R)",
+            f"    z = np.empty({law.sums * step}, R)",
+            f"    for r in range(np.int64(chunk) * {CHUNK}, min(m, (np.int64(chunk) + 1) * {CHUNK})):",
             *indented(particle, 2),
             "return status",
         ]
         return "\n".join([*self._build(bool(sides)), "", "", *self._head(), *indented(body, 1), ""])
 
     def _build(self, periodic: bool) -> list[str]:
-        """The function that sorts the particles into cells and lists the neighbours of each."""
+        """The function that sorts the particles into cells and lists the neighbours of each.
+
+        In a periodic box the images near its faces are sorted too, so that nobody needs to look across a face: a
+        record is a particle or an image of one, sorted; `top` is how many there is room for. Stretches of L, each of
+        this length: particle of a record, neighbours of a particle (by its place among the sorted ones), its record,
+        cell of a record not yet sorted, the order, particle of a record not yet sorted (less m: an image); then the
+        begins of the cells. X has positions when the list was made, and by how much images were moved, in both orders.
+        """
+        law, loop = self._law, self.loop
         sides = ["side0", "side1", "side2"] if periodic else []
         names = ["base", "s", "e", "reach", *sides, "H", "W", "K", "L", "N", "X", "x"]
-        axes = []
-        for a in range(3):
-            if periodic:
-                axes += [
-                    f"side = side{a}",
-                    f"n{a} = np.int64(max(1.0, min(np.floor(side / (far / {FINE[a]})), 1048576.0)))",
-                    "for i in range(m):",
-                    f"    X[{3 + a} * m + i] = side * np.floor(x[3 * (H[s + i] - base) + {a}] / side)",
-                ]
-            else:
-                axes += [
-                    f"low{a} = np.inf",
-                    "high = -np.inf",
-                    "for i in range(m):",
-                    f"    u = np.float64(x[3 * (H[s + i] - base) + {a}])",
-                    f"    low{a} = min(low{a}, u)",
-                    "    high = max(high, u)",
-                    f"most = min(max((high - low{a}) / (far / {FINE[a]}) + 1.0, {2 * FINE[a] + 1}.0), 1048576.0)",
-                    f"n{a} = np.int64(most)",
-                ]
-        place = []
-        for a in range(3):
-            value = f"x[3 * (H[s + i] - base) + {a}]"
-            if periodic:
-                place.append(f"u = np.float64({value} - X[{3 + a} * m + i]) / (np.float64(side{a}) / n{a})")
-            else:
-                place.append(f"u = np.floor((np.float64({value}) - low{a}) / (far / {FINE[a]}))")
-                place.append(f"u = u - n{a} * np.floor(u / n{a})")
-            place.append(f"c{a} = max(0, min(n{a} - 1, np.int64(u)))")
-        candidate = [f"e{a} = abs(p{a} - W[w{a} + np.uintp(q)])" for a in range(3)]
-        candidate += [f"e{a} = min(e{a}, side{a} - e{a})" for a in range(3) if periodic]
-        search = [
-            f"z = np.empty({PIECE}, R)",
-            f"for k in range(np.int64(chunk) * {CHUNK}, min(m, (np.int64(chunk) + 1) * {CHUNK})):",
-            "    c = np.int64(L[3 * m + L[k]])",
-            "    c0 = c % n0",
-            "    c1 = c // n0 % n1",
-            "    c2 = c // (n0 * n1)",
-            *(f"    p{a} = W[{a} * m + k]" for a in range(3)),
-            "    at = k * room",
-            "    found = 0",
-            "    for row in range(h1 * h2):",
-            "        r1 = (c1 + row % h1 - g1) % n1",
-            "        r2 = (c2 + row // h1 - g2) % n2",
-            "        first = 4 * m + (r2 * n1 + r1) * n0",
-            "        for part in range(2):",
-            f"            a = max(c0 - {FINE[0]}, 0)",
-            f"            b = min(c0 + {FINE[0] + 1}, n0)",
-            f"            if n0 < {2 * FINE[0] + 1}:",
-            "                a = 0",
-            "                b = n0 if part == 0 else 0",
-            "            elif part == 1:",
-            f"                a = n0 + c0 - {FINE[0]} if c0 < {FINE[0]} else 0",
-            f"                b = n0 if c0 < {FINE[0]} else max(0, c0 + {FINE[0] + 1} - n0)",
-            "            stop = np.int64(L[first + b])",
-            f"            for piece in range(np.int64(L[first + a]), stop, {PIECE}):",
-            f"                many = min({PIECE}, stop - piece)",
-            *(f"                w{a} = np.uintp({a} * m + piece)" for a in range(3)),
-            "                for q in range(many):",
-            *indented(candidate, 5),
-            "                    z[q] = e0 * e0 + e1 * e1 + e2 * e2",
-            "                if piece <= k < piece + many:",
-            "                    z[k - piece] = R(np.inf)",
-            "                start = np.uintp(at + min(found, room))",
-            "                c = start",
-            "                for q in range(many):",
-            "                    N[c] = piece + q",
-            "                    c += np.uintp(z[q] <= far2)",
-            "                found += np.int64(c - start)",
-            "    L[m + k] = found",
+        found = [
+            *(f"low{a} = min(low{a}, np.float64(u{a}))" for a in range(3)),
+            *(f"high{a} = max(high{a}, np.float64(u{a}))" for a in range(3)),
         ]
         if periodic:
-            edge = [f"p{a} < far or p{a} + far > side{a}" for a in range(3)]
-            search.append(f"    L[2 * m + k] = 1 if {' or '.join(edge)} else 0")
+            images = [
+                *(
+                    f"{end}{a} = {sign}1 if x[o + {a}] - h{a} {test} else 0"
+                    for a in range(3)
+                    for end, sign, test in (("a", "-", f">= side{a} - far"), ("b", "", "<= far"))
+                ),
+                "for i2 in range(a2, b2 + 1):",
+                "    for i1 in range(a1, b1 + 1):",
+                "        for i0 in range(a0, b0 + 1):",
+                "            itself = i0 == 0 and i1 == 0 and i2 == 0",
+                "            L[5 * top + total] = i if itself else i - m",
+                *(f"            X[{6 + a} * top + total] = h{a} - i{a} * side{a}" for a in range(3)),
+                *(f"            u{a} = x[o + {a}] - X[{6 + a} * top + total]" for a in range(3)),
+                *indented(found, 3),
+                "            total += 1",
+            ]
+        else:
+            images = [
+                *(f"u{a} = x[o + {a}]" for a in range(3)),
+                *found,
+                "L[5 * top + i] = i",
+                "total += 1",
+            ]
+        finite = [f"abs(x[o + {a}]{f' - h{a}' * periodic}) < np.inf" for a in range(3)]
+        counts = []
+        for a in range(3):
+            most = f"max((high{a} - low{a}) / (far / {FINE[a]}) + 1.0, {2 * FINE[a] + 1}.0)"
+            counts.append(f"n{a} = np.int64(min({most}, 1048576.0))")
+        place = ["i = np.int64(L[5 * top + q])", "o = 3 * (H[s + (i if i >= 0 else i + m)] - base)"]
+        for a in range(3):
+            where = f"np.float64(x[o + {a}]{f' - X[{6 + a} * top + q]' * periodic})"
+            place += [
+                f"u = np.floor(({where} - low{a}) / (far / {FINE[a]}))",
+                f"c{a} = max(0, min(n{a} - 1, np.int64(u - n{a} * np.floor(u / n{a}))))",
+            ]
+        place.append("L[3 * top + q] = (c2 * n1 + c1) * n0 + c0")
+        stretch = [
+            "for row in range(h1 * h2):",
+            "    r1 = (c1 + row % h1 - g1) % n1",
+            "    r2 = (c2 + row // h1 - g2) % n2",
+            "    first = 6 * top + (r2 * n1 + r1) * n0",
+            "    for part in range(2):",
+            f"        a = max(c0 - {FINE[0]}, 0)",
+            f"        b = min(c0 + {FINE[0] + 1}, n0)",
+            f"        if n0 < {2 * FINE[0] + 1}:",
+            "            a = 0",
+            "            b = n0 if part == 0 else 0",
+            "        elif part == 1:",
+            f"            a = n0 + c0 - {FINE[0]} if c0 < {FINE[0]} else 0",
+            f"            b = n0 if c0 < {FINE[0]} else max(0, c0 + {FINE[0] + 1} - n0)",
+            "        a = np.int64(L[first + a])",
+            "        b = np.int64(L[first + b])",
+        ]
+        each = [
+            "known = np.int64(-1)",
+            f"for r in range(np.int64(chunk) * {CHUNK}, min(m, (np.int64(chunk) + 1) * {CHUNK})):",
+            "    k = np.int64(L[2 * top + r])",
+            "    c = np.int64(L[3 * top + L[4 * top + k]])",
+            "    if c != known:",
+            "        known = c",
+            "        c0 = c % n0",
+            "        c1 = c // n0 % n1",
+            "        c2 = c // (n0 * n1)",
+            "        many = np.int64(0)",
+            *indented(stretch, 2),
+        ]
+        search = [
+            "wide = np.int64(0)",
+            *each,
+            "                many += max(b - a, 0)",
+            "        wide = max(wide, many)",
+            "z = np.empty(3 * wide, R)",
+            "I = np.empty(wide, np.int32)",
+            "B = np.empty(wide, np.int32)",
+            "many = np.int64(0)",
+            *each,
+            "                for q in range(b - a):",
+            *(
+                f"                    z[np.uintp({a} * wide + many + q)] = X[np.uintp({a} * top + a + q)]"
+                for a in range(3)
+            ),
+            "                    I[np.uintp(many + q)] = a + q",
+            "                many += max(b - a, 0)",
+            *(f"    p{a} = X[{a} * top + k]" for a in range(3)),
+            "    for q in range(many):",
+            *(f"        d{a} = p{a} - z[np.uintp({a} * wide) + np.uintp(q)]" for a in range(3)),
+            "        B[q] = 1 if d0 * d0 + d1 * d1 + d2 * d2 <= far2 and I[q] != k else 0",
+            "    found = 0",
+            f"    for piece in range(0, many, {PIECE}):",
+            "        start = np.uintp(r * room + min(found, room))",
+            "        c = start",
+            f"        for q in range(min({PIECE}, many - piece)):",
+            "            N[c] = I[np.uintp(piece + q)]",
+            "            c += np.uintp(B[np.uintp(piece + q)])",
+            "        found += np.int64(c - start)",
+            f"    full = (found + {NEAR_LANES - 1}) // {NEAR_LANES} * {NEAR_LANES}",
+            "    for q in range(min(found, room), min(full, room)):",
+            "        N[r * room + q] = top",
+            "    L[top + r] = full",
+        ]
         body = [
             "m = e - s",
             "room = K[1]",
+            "top = K[5]",
+            "n = top + 1",
             f"far = np.float64(reach) * {1 + SKIN}",
             "far2 = R(far * far)",
             "K[3] += 1",
-            "for k in range(3 * m):",
-            "    if not abs(x[3 * (H[s + k // 3] - base) + k % 3]) < np.inf:",
+            *(f"low{a} = np.inf" for a in range(3)),
+            *(f"high{a} = -np.inf" for a in range(3)),
+            "total = 0",
+            "for i in range(m):",
+            "    o = 3 * (H[s + i] - base)",
+            *(f"    h{a} = side{a} * np.floor(x[o + {a}] / side{a})" for a in range(3) if periodic),
+            f"    if not ({' and '.join(finite)}):",
             "        return 1",
-            *axes,
-            "while n0 * n1 * n2 > 4 * m + 27:",
+            *indented(images, 1),
+            "K[4] = total",
+            *counts,
+            "while n0 * n1 * n2 > 4 * total + 27:",
             "    if n0 >= n1 and n0 >= n2:",
             "        n0 = (n0 + 1) // 2",
             "    elif n1 >= n2:",
             "        n1 = (n1 + 1) // 2",
             "    else:",
             "        n2 = (n2 + 1) // 2",
+            f"for q in {loop}(total):",
+            *indented(place, 1),
             "cells = n0 * n1 * n2",
             "for c in range(cells + 1):",
-            "    L[4 * m + c] = 0",
-            "for i in range(m):",
-            *indented(place, 1),
-            "    c = (c2 * n1 + c1) * n0 + c0",
-            "    L[3 * m + i] = c",
-            "    L[4 * m + c] += 1",
+            "    L[6 * top + c] = 0",
+            "for q in range(total):",
+            "    L[6 * top + L[3 * top + q]] += 1",
             "before = 0",
             "for c in range(cells + 1):",
-            "    here = L[4 * m + c]",
-            "    L[4 * m + c] = before",
+            "    here = L[6 * top + c]",
+            "    L[6 * top + c] = before",
             "    before += here",
-            "for i in range(m):",
-            "    c = L[3 * m + i]",
-            "    L[L[4 * m + c]] = i",
-            "    L[4 * m + c] += 1",
+            "for q in range(total):",
+            "    c = L[3 * top + q]",
+            "    L[4 * top + L[6 * top + c]] = q",
+            "    L[6 * top + c] += 1",
             "for c in range(cells, 0, -1):",
-            "    L[4 * m + c] = L[4 * m + c - 1]",
-            "L[4 * m] = 0",
-            *(
-                ["for a in range(3):", "    for k in range(m):", "        X[a * m + k] = X[(3 + a) * m + L[k]]"]
-                * periodic
-            ),
-            *(["for k in range(3 * m):", "    X[3 * m + k] = X[k]"] * periodic),
-            "for k in range(m):",
+            "    L[6 * top + c] = L[6 * top + c - 1]",
+            "L[6 * top] = 0",
+            "r = 0",
+            "for k in range(total):",
+            "    if L[5 * top + L[4 * top + k]] >= 0:",
+            "        L[2 * top + r] = k",
+            "        r += 1",
+            f"for k in {loop}(total):",
+            "    q = np.int64(L[4 * top + k])",
+            "    i = np.int64(L[5 * top + q])",
+            "    L[k] = i if i >= 0 else i + m",
             "    o = 3 * (H[s + L[k]] - base)",
             "    for a in range(3):",
-            f"        W[a * m + k] = x[o + a]{' - X[(3 + a) * m + k]' * periodic}",
-            "        X[a * m + k] = W[a * m + k]",
+            *["        X[(3 + a) * top + k] = X[(6 + a) * top + q]"] * periodic,
+            f"        X[a * top + k] = x[o + a]{' - X[(3 + a) * top + k]' * periodic}",
+            "    W[4 * k + 3] = reach * reach",
+            *(f"{law.entry(q, 'top')} = {'R(np.inf)' if q in vector_names('x') else 'R(0)'}" for q in law.quantities),
             "h1 = min(n1, 3)",
             "h2 = min(n2, 3)",
             "g1 = 1 if n1 > 2 else 0",
             "g2 = 1 if n2 > 2 else 0",
-            f"for chunk in {self.loop}((m + {CHUNK - 1}) // {CHUNK}):",
+            f"for chunk in {loop}((m + {CHUNK - 1}) // {CHUNK}):",
             *indented(search, 1),
             "most = 0",
-            "for k in range(m):",
-            "    most = max(most, L[m + k])",
+            "for r in range(m):",
+            "    most = max(most, L[top + r])",
             "K[2] = most",
             "if most >= room:",
             f"    return {FULL}",
@@ -375,8 +500,23 @@ class Pairs:
         return [f"@njit({self.flags})", f"def build{self.number}({', '.join(names)}):", *indented(body, 1)]
 
 
+def _halves(sums: list[int], lanes: int) -> list[str]:
+    """Statements that add up the lanes of some sums in z, in pairs."""
+    return [
+        line
+        for half in (lanes >> k for k in range(1, lanes.bit_length()))
+        for line in (f"for l in range({half}):", *(f"    z[{a} + l] = z[{a} + l] + z[{a + half} + l]" for a in sums))
+    ]
+
+
 class _Law:
-    """A pair law with its inputs found: numbers that all share, and quantities of each particle, rows of W."""
+    """A pair law with its inputs found: numbers that all share, and quantities of each particle, which lie in W.
+
+    Attributes
+    ----------
+    packed : quantities that lie side by side, four numbers for each particle, since neighbours are anywhere; where
+        these are the position only, the fourth is the square of the cut-off. Others have a row each.
+    """
 
     def __init__(self, force: PairForce, tag: str, binder: Binder, near: bool) -> None:
         self.force, self.tag, self.binder = force, tag, binder
@@ -398,6 +538,7 @@ class _Law:
         order = [q for node, q in self.inputs.values() if node == "1"]
         self.first, self.second = ([q for q in order if q in wanted[node] or q in place] for node in "12")
         self.quantities = [q for q in order if q in self.first or q in self.second or q in later & set(own)]
+        self.packed = [*place, *[q for q in self.second if q not in place][:1]] if near else []
         shared = self._values(common, "")
         owned = self._values([p for p in own if p in self.quantities], "g")
         self.at_time = shared.at_time + owned.at_time
@@ -405,16 +546,20 @@ class _Law:
         self._lines = owned.lines
         self._owned = dict(zip([p for p in own if p in self.quantities], owned.outputs, strict=True))
 
-    def row(self, quantity: str) -> int:
-        """Row of W."""
-        return self.quantities.index(quantity)
+    def entry(self, quantity: str, index: str) -> str:
+        """A quantity of a particle in W, as an expression: n is how many particles a row has room for."""
+        if quantity in self.packed:
+            return f"W[np.uintp(4) * np.uintp({index}) + np.uintp({self.packed.index(quantity)})]"
+        row = [q for q in self.quantities if q not in self.packed].index(quantity)
+        return f"W[np.uintp({row + 4 * bool(self.packed)} * n) + np.uintp({index})]"
 
-    def copies(self, stride: str, index: str) -> list[str]:
-        """Statements that write the quantities of the row g to a place in W."""
+    def copies(self, index: str, moved: Sequence[str] = ("", "", "")) -> list[str]:
+        """Statements that write the quantities of the row g to a place in W, positions with something added."""
         expressions = {"m": self.binder.attribute("m", "g")} if "m" in self.quantities else {}
         expressions |= self._owned
-        expressions |= {n: f"{q}[o + np.uintp({a})]" for q in "xv" for a, n in enumerate(vector_names(q))}
-        writes = [f"W[np.uintp({k} * {stride} + {index})] = {expressions[q]}" for k, q in enumerate(self.quantities)]
+        expressions |= {n: f"v[o + np.uintp({a})]" for a, n in enumerate(vector_names("v"))}
+        expressions |= {n: f"x[o + np.uintp({a})]{moved[a]}" for a, n in enumerate(vector_names("x"))}
+        writes = [f"{self.entry(q, index)} = {expressions[q]}" for q in self.quantities]
         return ["o = np.uintp(3 * (g - base))", *self._lines, *writes]
 
     def pair(self, first: dict[str, str], second: dict[str, str], prefix: str) -> tuple[list[str], list[str]]:
@@ -423,14 +568,27 @@ class _Law:
         names = {name: sides[node][q] for name, (node, q) in self.inputs.items() if q in sides[node]} | self.common
         return statements(self.program, names, f"{self.tag}{prefix}", self.binder.dtype)
 
-    def result(self, row: str, index: str, stride: str) -> list[str]:
+    def mirrored(
+        self, first: dict[str, str], second: dict[str, str], prefix: str
+    ) -> tuple[list[str], list[str], list[str]]:
+        """Statements for one pair, and the outputs for its first and for its second particle."""
+        sides = {"1": first, "2": second}
+        names = {name: sides[node][q] for name, (node, q) in self.inputs.items() if q in sides[node]} | self.common
+        places = {place: name for name, place in self.inputs.items()}
+        other = {name: places["21"["12".index(node)], q] for name, (node, q) in self.inputs.items()}
+        both = expanded(self.program)
+        both.outputs += expanded(self.program, both, other).outputs
+        lines, outputs = statements(both, names, f"{self.tag}{prefix}", self.binder.dtype)
+        return lines, outputs[: self.sums], outputs[self.sums :]
+
+    def result(self, row: str, index: str) -> list[str]:
         """Statements that write the force on the particle of a row, whose sums are sum0, sum1, ..."""
         outputs = [f"sum{k}" for k in range(self.sums)]
         lines: list[str] = []
         if self.finish is not None:
             names = {f"sum{k}": f"sum{k}" for k in range(self.sums)} | self.common
             names |= {n: f"{q}[3 * (g - base) + {a}]" for q in "xv" for a, n in enumerate(vector_names(q))}
-            names |= {q: f"W[{self.row(q)} * {stride} + {index}]" for q in self._owned}
+            names |= {q: self.entry(q, index) for q in self._owned}
             names |= {"m": self.binder.attribute("m", "g")}
             lines, outputs = statements(self.finish, names, f"{self.tag}e_", self.binder.dtype)
         return [f"g = {row}", *lines, *(f"F[3 * g + {a}] = {o}" for a, o in enumerate(outputs))]
@@ -454,15 +612,11 @@ class PairArrays:
         rows = place[particles.select(pairs.force.on)]
         self.rows = rows[rows >= 0].astype(np.int64)
         count, dtype = len(self.rows), particles.dtype
-        padded = count if pairs.near else -(-count // pairs.tile) * pairs.tile
-        self._work = np.empty(pairs.quantities * padded, dtype)
         self._forces = np.zeros(3 * (int(place.max(initial=-1)) + 1), dtype)
-        self._head = np.zeros(HEAD + -(-count // CHUNK), np.int64)
-        self._cells = np.zeros(8 * count + 28, np.int32)
-        self._origin = np.zeros(6 * count, dtype)
+        self._work = np.empty(pairs.quantities * -(-count // pairs.tile) * pairs.tile * (not pairs.near), dtype)
+        self._head = np.zeros(HEAD, np.int64)
         self._neighbours = np.zeros(0, np.int32)
         self._known: Any = None
-        self._reserve(32)
 
     def arrays(self) -> list[Any]:
         """The kernel's arguments, in the order of `Pairs.arguments`; another cut-off makes it find neighbours anew."""
@@ -471,12 +625,24 @@ class PairArrays:
         now = self.pairs.force.reach(self.particles), self.pairs.force.box
         if now != self._known:
             self._known = now
-            self.forget()
+            self._begin()
         if 5 * self._head[2] > 4 * self._head[1]:  # before it is full: a run that begins again finds all anew
             self._reserve(int(self._head[2]))
         return [
             self.rows, self._work, self._forces, self._head, self._cells, self._neighbours, self._origin,
         ]  # fmt: skip
+
+    def _begin(self) -> None:
+        """Memory for another cut-off; what is never used of it costs nothing."""
+        count, dtype, box = len(self.rows), self.particles.dtype, self.pairs.force.box
+        far = _reach(self.pairs.force, self.particles) * (1 + SKIN)
+        top = count * int(np.prod([2 if 2.01 * far < side else 3 for side in box])) if box else count
+        self._work = np.zeros((self.pairs.quantities + 1) * (top + 1), dtype)
+        self._cells = np.zeros(10 * top + 28, np.int32)
+        self._origin = np.zeros(9 * top if box else 3 * top, dtype)
+        self._head = np.zeros(HEAD + -(-top // CHUNK), np.int64)
+        self._head[5] = top
+        self._reserve(32)
 
     def forget(self) -> None:
         """Find the neighbours anew at the next call, whatever moved: on the grid of steps from which runs go on."""
@@ -491,7 +657,7 @@ class PairArrays:
     def _reserve(self, most: int) -> None:
         """Room for half as many neighbours again; those that are known stay, so that growing changes no bit."""
         room, old = most * 3 // 2 + 16, int(self._head[1])
-        count = len(self.rows) if self.pairs.near else 0
+        count = len(self.rows)
         grown = np.zeros(room * count + PIECE, np.int32)
         if old:
             each = min(old, room)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import inspect
 import linecache
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from hashlib import sha256
 from typing import Any
@@ -19,9 +20,15 @@ INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", 
 FLOATS = (np.dtype(np.float64), np.dtype(np.float32))
 
 
-def expanded(program: Program) -> Program:
-    """The program with sin, exp, ... replaced by their polynomials."""
-    result = Program()
+def expanded(program: Program, after: Program | None = None, names: Mapping[str, str] | None = None) -> Program:
+    """The program with sin, exp, ... replaced by their polynomials.
+
+    Parameters
+    ----------
+    after : a program whose operations go before, so that those which are equal are stored once.
+    names : new names of inputs.
+    """
+    result = Program() if after is None else replace(after, outputs=[])
     new: dict[int, int] = {}
     for i in program.live():
         node = program.nodes[i]
@@ -31,7 +38,7 @@ def expanded(program: Program) -> Program:
         elif node[0] == "const":
             new[i] = result.constant(node[1])
         elif node[0] == "arg":
-            new[i] = result.argument(node[1])
+            new[i] = result.argument((names or {}).get(node[1], node[1]))
         elif node[0] == "call":
             new[i] = result.call(node[1], *moved)
         else:
