@@ -193,9 +193,9 @@ class Engine:
         p = self.system.particles
         if self._before is None or self._before[0].shape != p.x.shape:
             self._before = np.empty_like(p.x), np.empty_like(p.v)
-        whole = [g.members for g in self._grouped(births, span.start) if g.rows is None]
-        if births is None and not look_inside and len(whole) == 1 and isinstance(whole[0], SingleMembers):
-            whole[0].before = self._before  # in one go with the steps
+        kernels = [g.members for g in self._grouped(births, span.start) if g.rows is None]
+        if births is None and not look_inside and len(kernels) == 1 and isinstance(kernels[0], SingleMembers):
+            kernels[0].before = self._before  # in one go with the steps
         else:
             for kept, array in zip(self._before, (p.x, p.v), strict=True):
                 _copied(kept, array)
