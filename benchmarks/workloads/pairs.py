@@ -22,8 +22,8 @@ GRAVITY = "Direct gravitation"
 MELT = "Lennard-Jones melt"
 SAMPLE = 128  # bodies that the judge looks at
 BLOCK = 64  # bodies whose pairs with all others are columns of NumPy at a time
-# 3 differences, distance 3, root 4, weight 3, sums 3; differences can go to an adder
-GRAVITY_SLOTS = 13
+# for two interactions, each way of a pair: distance 3, root 4, cube 2, weights 2, sums 6; differences can go to an adder
+GRAVITY_SLOTS = 8.5
 # distance 3, power and force 9, sums 3, for each of 37.6 pairs of a particle, and the step
 MELT_SLOTS = 37.6 * 15 + 6
 DRIFT_FRAMES = 5  # at the end, over which the energy is watched

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -120,6 +121,14 @@ def reference(force: Any, p: pm.Particles) -> np.ndarray:
 
 def close(f: np.ndarray, want: np.ndarray, tolerance: float) -> None:
     np.testing.assert_allclose(f, want, rtol=0, atol=tolerance * max(np.abs(want).max(), 1e-30))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_loops_of_all_threads_are_found_by_numba(case: str) -> None:
+    """It takes a `prange` for a plain loop, without a word, where there is a choice in its argument."""
+    text = Kernel(CASES[case](), cloud(20, "float32"), plain=True).pairs.text
+    loops = re.findall(r"prange\((.*)\):", text)
+    assert len(loops) > 1 and not [loop for loop in loops if " if " in loop]
 
 
 @pytest.mark.parametrize("parallel", [True, False])

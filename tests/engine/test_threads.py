@@ -30,6 +30,11 @@ for n, dtype in ((5000, "float64"), (3000, "float32")):
         sim = pm.Simulation(pm.ParticleSystem(particles, forces), solver, 1 / 60, compiled=True)
         sim.step(10)
         hash.update(particles.x.tobytes() + particles.v.tobytes() + particles.age.tobytes())
+for force in (pm.Gravitation(1.0, eps=0.1), pm.SoftSphere()):
+    particles = pm.Particles(rng.uniform(-1, 1, (1100, 3)), dtype="float32", radius=0.05)
+    sim = pm.Simulation(pm.ParticleSystem(particles, [force]), "leapfrog", 1e-3, compiled=True)
+    sim.step(10)
+    hash.update(particles.x.tobytes() + particles.v.tobytes())
 print(hash.hexdigest())
 """
 

@@ -204,7 +204,8 @@ class Pairs:
             "teams = (tiles + group - 1) // group",
             "teams += teams % 2",
             "for turn in range(teams):",
-            "    for table in prange(teams // 2 if turn > 0 else teams):",
+            "    tables = teams // 2 if turn > 0 else teams",  # a choice within prange() would make a loop of one thread
+            "    for table in prange(tables):",
             "        first = np.int64(table)",
             "        second = first",
             "        if turn > 0:",
