@@ -22,7 +22,7 @@ GRAVITY = "Direct gravitation"
 MELT = "Lennard-Jones melt"
 SAMPLE = 128  # bodies that the judge looks at
 BLOCK = 64  # bodies whose pairs with all others are columns of NumPy at a time
-# for two interactions, each way of a pair: distance 3, root 4, cube 2, weights 2, sums 6; differences can go to an adder
+# of two, each way of a pair: distance 3, root 4, cube 2, weights 2, sums 6; differences can go to an adder
 GRAVITY_SLOTS = 8.5
 # distance 3, power and force 9, sums 3, for each of 37.6 pairs of a particle, and the step
 MELT_SLOTS = 37.6 * 15 + 6

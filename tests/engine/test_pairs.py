@@ -91,7 +91,7 @@ class Kernel:
         place[self.order] = np.arange(len(p))
         binder = Binder(p, Table("C"))
         self.pairs = Pairs(force, 3, binder, parallel)
-        text = self.pairs.text.replace("**OWNING", "**ENTRY")  # called from Python here
+        text = self.pairs.text.replace("**OWNING", "**OWNING_ENTRY")  # called from Python here
         made = (store.plain if plain else store.load)("pairs", text, str(p.dtype))
         self.function = (made if plain else vars(made))["pairs3"]
         self.arrays = PairArrays(self.pairs, p, place)
@@ -128,7 +128,8 @@ def test_loops_of_all_threads_are_found_by_numba(case: str) -> None:
     """It takes a `prange` for a plain loop, without a word, where there is a choice in its argument."""
     text = Kernel(CASES[case](), cloud(20, "float32"), plain=True).pairs.text
     loops = re.findall(r"prange\((.*)\):", text)
-    assert len(loops) > 1 and not [loop for loop in loops if " if " in loop]
+    assert len(loops) > 1
+    assert not [loop for loop in loops if " if " in loop]
 
 
 @pytest.mark.parametrize("parallel", [True, False])

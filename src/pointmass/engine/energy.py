@@ -32,7 +32,7 @@ class PairEnergy:
         self._particles = particles
         self._binder = Binder(particles, Table("C"))
         self._pairs = Pairs(law, 0, self._binder, parallel=True)
-        head, tail = f"**OWNING)\ndef pairs{self._pairs.number}(", f"**ENTRY)\ndef pairs{self._pairs.number}("
+        head, tail = f"**OWNING)\ndef pairs{self._pairs.number}(", f"**OWNING_ENTRY)\ndef pairs{self._pairs.number}("
         text = self._binder.functions + self._pairs.text.replace(head, tail)
         module = store.load(law.name, text, str(particles.dtype))
         self._run = vars(module)["pairs0"]

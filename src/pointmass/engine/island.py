@@ -6,6 +6,7 @@ island, loop by loop.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -121,7 +122,7 @@ class IslandKernel:
         if deriv.contact is None:
             return None
         row = [deriv.binder.attribute(name, "g") for name in ("w", "m", "radius")]
-        return Impacts(deriv.contact, self.system.order, deriv.loop, deriv.once, deriv.call, *row)
+        return Impacts(deriv.contact, self.system.order, deriv.loop, deriv.flags, deriv.call, *row)
 
     def _step_text(self) -> StepText:
         if isinstance(self.solver, Implicit):
@@ -156,7 +157,8 @@ class IslandKernel:
 
     @property
     def scratch(self) -> list[str]:
-        """Statements that make what an island needs; M has the largest counts of particles and of elements."""
+        """Statements that make what a thread needs for an island; M has the largest counts of particles and of
+        elements."""
         contact = self.deriv.contact
         families = enumerate(self.deriv.families)
         lines = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{k + 1}], R)" for k, f in families]
@@ -318,11 +320,10 @@ class IslandKernel:
         ]
         data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers)])
         grid = ", ".join([*self.memory, "birth, t0, dt, k0, count, lengths, controls, work, status, reach"])
-        given = f"lo, hi, first, x, v, {data}, M, {grid}"
+        given = f"lo, hi, first, x, v, {data}, {grid}"
         made = ", ".join(line.split(" = ")[0] for line in self.scratch)
-        islands = ["@njit(**FLAGS)", f"def islands({given}, {made}):", "    for island in range(lo, hi):"]
-        run = ["@njit(**ENTRY)", f"def run({given}):", *indented([*self.scratch, f"islands({given}, {made})"], 1)]
-        return "\n".join([*islands, *indented(island, 2), "", "", *run, ""])
+        run = ["@njit(**ENTRY)", f"def run({given}, {made}):", "    for island in range(lo, hi):", *indented(island, 2)]
+        return "\n".join([*scratch_text(self.scratch), *run, ""])
 
     @property
     def title(self) -> str:
@@ -338,6 +339,12 @@ class IslandKernel:
     def members(self, rows: Rows, labels: Rows) -> IslandMembers:
         """Particles to be advanced: see `IslandMembers`."""
         return IslandMembers(self, rows, labels)
+
+
+def scratch_text(lines: Sequence[str]) -> list[str]:
+    """A function of plain Python for some statements that make arrays of a size M, one call for each thread."""
+    made = ", ".join(line.split(" = ")[0] for line in lines)
+    return ["def scratch(M):", *indented([*lines, f"return {made},"], 1), "", ""]
 
 
 class IslandMembers:
@@ -400,7 +407,6 @@ class IslandMembers:
             *data,
             *contact,
             *starts,
-            np.array(most),
             *kept,
             begin,
             *grid,
@@ -410,7 +416,8 @@ class IslandMembers:
             reach,
         )
         kernel = self.kernel.functions["run"]
-        spread(lambda lo, hi: kernel(lo, hi, *arrays), islands, max(1, GRAIN * islands // count))
+        scratch = self.kernel.functions["scratch"]
+        spread(lambda lo, hi: kernel(lo, hi, *arrays, *scratch(most)), islands, max(1, GRAIN * islands // count))
         for name, column in zip(CONTROL, control.T, strict=True):
             if name in memory:
                 memory[name][self.islands] = column

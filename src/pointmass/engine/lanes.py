@@ -359,7 +359,7 @@ class LanesKernel:
                 f"            s[{row} * L + i] = K[o + i]",
             ]
         return [
-            "@njit(**ENTRY)",
+            "@njit(**OWNING_ENTRY)",
             f"def run(first, last, islands, x, v, {self._shared()}, K, O, t0, dt, k0, count, status, reach):",
             f"    s = np.zeros({self.scratch.rows} * L, R)",
             "    g = np.empty(STAGE * L, R)",

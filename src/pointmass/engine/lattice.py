@@ -438,7 +438,7 @@ class LatticeKernel:
 
     def _run(self) -> list[str]:
         shared = self._shared()
-        return f'''@njit(parallel=True, **ENTRY)
+        return f'''@njit(parallel=True, **OWNING_ENTRY)
 def sweep(Y, Z, work, {shared}, K, O, height, m, n, t0, dt, k, steps, status):
     wide = (n + INNER - 1) // INNER
     tiles = (m + height - 1) // height * wide
@@ -451,7 +451,7 @@ def sweep(Y, Z, work, {shared}, K, O, height, m, n, t0, dt, k, steps, status):
         status[chunk] |= bad
 
 
-@njit(**ENTRY)
+@njit(**OWNING_ENTRY)
 def apart(lo, hi, x, v, Y, m, n):
     """(x, y, z) of each particle to a row of each component."""
     for r in range(lo, hi):
@@ -461,7 +461,7 @@ def apart(lo, hi, x, v, Y, m, n):
                 Y[((3 + a) * m + r) * n + c] = v[3 * (r * n + c) + a]
 
 
-@njit(**ENTRY)
+@njit(**OWNING_ENTRY)
 def together(lo, hi, x, v, Y, m, n, reach):
     """The way back, and the largest size of a component in each row."""
     for r in range(lo, hi):

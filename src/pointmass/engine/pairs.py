@@ -204,7 +204,7 @@ class Pairs:
             "teams = (tiles + group - 1) // group",
             "teams += teams % 2",
             "for turn in range(teams):",
-            "    tables = teams // 2 if turn > 0 else teams",  # a choice within prange() would make a loop of one thread
+            "    tables = teams // 2 if turn > 0 else teams",  # a choice within prange() would leave it to one thread
             "    for table in prange(tables):",
             "        first = np.int64(table)",
             "        second = first",

@@ -18,7 +18,7 @@ from pointmass.engine import store
 from pointmass.engine.binding import Binder, Table, equal_columns
 from pointmass.engine.contact import ClearLines
 from pointmass.engine.forces import unary
-from pointmass.engine.island import NOT_FINITE, IslandKernel, Outcome, Span
+from pointmass.engine.island import NOT_FINITE, IslandKernel, Outcome, Span, scratch_text
 from pointmass.engine.printing import indented, literal
 from pointmass.engine.threads import spread
 from pointmass.laws.unary import UnaryForce
@@ -73,6 +73,14 @@ def load(s, offset, x, lo, m):
 
 
 @njit(**FLAGS)
+def copy(kept, x, lo, m):
+    """Rows of x to where they are kept."""
+    a = np.uintp(3 * lo)
+    for j in range(3 * m):
+        kept[a + np.uintp(j)] = x[a + np.uintp(j)]
+
+
+@njit(**FLAGS)
 def keep(s, offset, x, lo, m):
     """The way back."""
     o = np.uintp(offset)
@@ -90,6 +98,19 @@ def keep(s, offset, x, lo, m):
 
 
 '''
+
+
+WAITS = f"""@njit(**FLAGS)
+def somebody_waits(s, first, count):
+    bits = s.view(BITS)
+    o = np.uintp({6 * W} + first)
+    any_bit = BITS(0)
+    for j in range(count):
+        any_bit |= bits[o + np.uintp(j)]
+    return any_bit != 0
+
+
+"""
 
 
 class Lanes(Table):
@@ -226,8 +247,8 @@ class SinglesKernel:
         unrolled = [u for u in UNROLLED if u == 1 or not (timed or len(step) > LONG)]
         lanes = [line for u in unrolled for line in self._lanes(u, step, clear)]
         first = motion.binder.functions if island is None else island.functions_text
-        catch_up = [] if island is None else [*self._one_lane(step, clear), *self._catch_up(island)]
-        return "\n".join([first, "", TRANSPOSED, *lanes, *catch_up, *self._run(unrolled), ""])
+        one = [] if island is None else [WAITS, *self._one_lane(step, clear)]
+        return "\n".join([first, "", TRANSPOSED, *lanes, *one, *self._run(unrolled), ""])
 
     def _clear(self) -> ClearLines | None:
         contact = None if self.island is None else self.island.deriv.contact
@@ -307,9 +328,8 @@ class SinglesKernel:
         ]
 
     def _catch_up(self, island: IslandKernel) -> list[str]:
-        """The function that takes those who waited over the steps that the others have made."""
+        """Statements that take those who waited over the `stride` steps that the others have made."""
         call = island.call.replace("base, n,", "lo + i, 1,").replace(", x, v, ", ", xi, vi, ")
-        arguments = call.replace("lo + i, 1,", "").replace("clock, end, ", "")
         waiting = f"s[{6 * W} + i]"
         state = [
             (f"{q}i[{k}]", f"s[{(3 * ('xv'.index(q)) + k) * W} + i]")
@@ -320,38 +340,22 @@ class SinglesKernel:
         # Most of the steps that somebody waited for are clear after all: only those that are not take the long way.
         easy = f"clock == t0 + j * dt and lane(np.uintp(i), {', '.join(self.shared)}, clock, end)"
         return [
-            "@njit(**FLAGS)",
-            "def somebody_waits(s, first, count):",
-            "    bits = s.view(BITS)",
-            f"    o = np.uintp({6 * W} + first)",
-            "    any_bit = BITS(0)",
-            "    for j in range(count):",
-            "        any_bit |= bits[o + np.uintp(j)]",
-            "    return any_bit != 0",
-            "",
-            "",
-            "@njit(**FLAGS)",
-            f"def catch_up(s, lo, m, t0, dt, k, steps, birth, {arguments}):",
-            "    status = 0",
-            f"    for first in range(0, {W}, {BUNCH}):",
-            f"        if not somebody_waits(s, first, {BUNCH}):",
-            "            continue",
-            f"        for i in range(first, first + {BUNCH}):",
-            f"            if {waiting} != 0 and i < m:",
-            "                for j in range(k, k + steps):",
-            "                    clock = t0 + j * dt",
-            "                    end = t0 + (j + 1) * dt",
-            *indented(begin, 5),
-            f"                    {waiting} = R(0)",
-            f"                    if clock < end and status == 0 and not ({easy}):",
-            *indented([f"{local} = {entry}" for local, entry in state], 6),
-            *["                        known[0] = 0"] * island.step.keeps,
-            f"                        status = advance({call})",
-            *indented([f"{entry} = {local}" for local, entry in state], 6),
-            f"            {waiting} = R(0)",
-            "    return status",
-            "",
-            "",
+            f"for bunch in range(0, {W}, {BUNCH}):",
+            f"    if not somebody_waits(s, bunch, {BUNCH}):",
+            "        continue",
+            f"    for i in range(bunch, bunch + {BUNCH}):",
+            f"        if {waiting} != 0 and i < m:",
+            "            for j in range(k, k + stride):",
+            "                clock = t0 + j * dt",
+            "                end = t0 + (j + 1) * dt",
+            *indented(begin, 4),
+            f"                {waiting} = R(0)",
+            f"                if clock < end and bad == 0 and not ({easy}):",
+            *indented([f"{local} = {entry}" for local, entry in state], 5),
+            *["                    known[0] = 0"] * island.step.keeps,
+            f"                    bad = advance({call})",
+            *indented([f"{entry} = {local}" for local, entry in state], 5),
+            f"        {waiting} = R(0)",
         ]
 
     def _run(self, unrolled: list[int]) -> list[str]:
@@ -360,7 +364,7 @@ class SinglesKernel:
         columns = len(motion.binder.particle.getters)
         copies = [(q, 3 * W * k) for k, q in enumerate("xv"[:order])]
         shared = ", ".join(self.shared)
-        prepared, began, hold, caught = [], [], [], ""
+        prepared, began, hold, caught = [], [], [], []
         if island is not None:
             own = [
                 "xi = np.zeros(3, R)",
@@ -369,25 +373,19 @@ class SinglesKernel:
                 "done = np.zeros(5, np.int64)",
                 "h_before = np.full(1, np.inf)",
             ]
-            prepared = ["M = np.ones(1, np.int64)", *island.scratch, *own]
+            prepared = [*island.scratch, *own]
             began = [f"for i in range({W}):", f"    s[{6 * W} + i] = R(0)"]
-            arguments = (
-                island.call.replace("base, n, ", "").replace("clock, end, ", "").replace(", x, v, ", ", xi, vi, ")
-            )
-            arguments = arguments.removeprefix("clock, end, ")
-            caught = f"bad |= catch_up(s, lo, m, t0, dt, k, STEPS, birth, {arguments})"
+            caught = [f"if somebody_waits(s, 0, {W}):", *indented(self._catch_up(island), 1)]
         if self.births:
             began += ["late = -np.inf", "for i in range(m):", "    late = max(late, birth[lo + i])"]
             hold = ["if late > t0 + k * dt:", "    for i in range(m):"]
             hold += [f"        s[{6 * W} + i] = R(1) if birth[lo + i] > t0 + k * dt else R(0)"]
-        steps = []
+        steps = [*hold, "stride = 1"]
         for u in unrolled:
             times = ", ".join(f"t0 + (k + {j}) * dt" for j in range(u + 1))
-            one = [*hold, f"bad |= lanes{u}({shared}, {times})"] + [
-                f"if somebody_waits(s, 0, {W}):",
-                "    " + caught.replace("STEPS", f"{u}"),
-            ] * bool(caught)
-            steps += [f"while k + {u} <= k0 + count:", *indented([*one, f"k += {u}"], 1)]
+            few = f"k + {u} <= k0 + count" if u > 1 else "stride == 1"
+            steps += [f"if {few}:", f"    bad |= lanes{u}({shared}, {times})", *[f"    stride = {u}"] * (u > 1)]
+        steps = ["while k < k0 + count:", *indented([*steps, *caught, "k += stride"], 1)]
         arrays = [*motion.binder.arrays, *(["F"] if self.system.colliders else [])]
         given = f"first, last, x, v, x_kept, v_kept, {', '.join(arrays)}, birth, t0, dt, k0, count, status, reach"
         made = [f"s = np.ones({(STATE + columns) * W}, R)", *prepared]
@@ -397,8 +395,7 @@ class SinglesKernel:
             f"lo = tile * {W}",
             f"m = min({W}, len(x) // 3 - lo)",
             "if len(x_kept) > 0:",
-            "    for q in range(3 * lo, 3 * (lo + m)):",
-            *(f"        {q}_kept[q] = {q}[q]" for q in "xv"),
+            *(f"    copy({q}_kept, {q}, lo, m)" for q in "xv"),
             *(f"load(s, {offset}, {q}, lo, m)" for q, offset in copies),
             *(["for i in range(m):", *own] if own else []),
             *began,
@@ -411,15 +408,11 @@ class SinglesKernel:
             *(f"keep(s, {offset}, {q}, lo, m)" for q, offset in copies),
         ]
         return [
-            "@njit(**FLAGS)",
-            f"def tiles({given}, {names}):",
+            *scratch_text(made),
+            "@njit(**ENTRY)",
+            f"def run({given}, {names}):",
             "    for tile in range(first, last):",
             *indented(tile, 2),
-            "",
-            "",
-            "@njit(**ENTRY)",
-            f"def run({given}):",
-            *indented([*made, f"tiles({given}, {names})"], 1),
             "",
         ]
 
@@ -472,7 +465,8 @@ class SingleMembers:
         tiles = -(-count // W)
         status, reach = np.zeros(tiles, np.int64), np.zeros((tiles, 2), x.dtype)
         grid = (span.t0, span.dt, span.first, span.count)
-        kernel = self.kernel.functions["run"]
-        spread(lambda lo, hi: kernel(lo, hi, x, v, *kept, *data, *grid, status, reach), tiles, GRAIN)
+        kernel, scratch = self.kernel.functions["run"], self.kernel.functions["scratch"]
+        arrays = (x, v, *kept, *data, *grid, status, reach)
+        spread(lambda lo, hi: kernel(lo, hi, *arrays, *scratch([1])), tiles, GRAIN)
         work = Stats(span.count, 0, span.count * motion.evaluations)
         return Outcome(not status.any(), reach.max(axis=0).astype(np.float64), work)

@@ -34,7 +34,8 @@ from pointmass.engine.support import exponent, scaled, select, significand
 R = np.{dtype}
 OWNING = {{"_nrt": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True{fast}}}
 FLAGS = {{**OWNING, "_nrt": False}}  # of what makes no arrays: nobody counts references to those that it is given
-ENTRY = {{"error_model": "numpy", "cache": True, "nogil": True{fast}}}  # of what Python calls
+ENTRY = {{"_nrt": False, "error_model": "numpy", "cache": True, "nogil": True{fast}}}  # of what Python calls
+OWNING_ENTRY = {{**ENTRY, "_nrt": True}}
 
 '''
 FAST = ', "fastmath": {"contract", "arcp"}'  # never those that assume that there is no NaN, or reorder sums
@@ -65,7 +66,8 @@ def load(title: str, text: str, dtype: str) -> ModuleType:
     Parameters
     ----------
     title : one line that says what it is.
-    text : functions, with the names that the header provides: np, njit, prange, R, OWNING, FLAGS, ENTRY.
+    text : functions, with the names that the header provides: np, njit, prange, R, FLAGS, ENTRY,
+        and OWNING, OWNING_ENTRY for those that make arrays.
     dtype : "float64" or "float32".
     """
     source = complete(title, text, dtype)
