@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pointmass.engine.forces import Incidence
 
 LANES = 64  # rows of a slice
-FEWEST = LANES // 4  # blocks of a run: a lane without one costs a quarter of a block that is looked up
+FEWEST = LANES // 2  # blocks of a run: more bytes for each than when it is looked up, but no index
 PARTS = ("ends", "other", "block", "runs", "start", "fill")
 
 Whole = NDArray[np.integer]

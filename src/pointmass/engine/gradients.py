@@ -36,30 +36,37 @@ class Gradients:
     Attributes
     ----------
     scratch : arrays that they need -> the expressions that make them, but for those of the blocks.
+    matrix : arguments that say what the matrix is.
+    calls : of `condense`, and of `gradients`, which returns the number of iterations.
 
     Parameters
     ----------
-    shared : arguments of all functions.
     own : whether forces on single particles have derivatives.
     projected : whether vectors are projected by Q on what contacts leave free, p to u.
     """
 
-    def __init__(
-        self, deriv: Deriv, solver: Implicit, kinds: Sequence[Kind], shared: str, own: bool, projected: bool
-    ) -> None:
-        self.deriv, self.solver, self.kinds, self.shared = deriv, solver, kinds, shared
+    def __init__(self, deriv: Deriv, solver: Implicit, kinds: Sequence[Kind], own: bool, projected: bool) -> None:
+        self.deriv, self.solver, self.kinds = deriv, solver, kinds
         self.own, self.projected = own, projected
         self.source = "u" if projected else "p"
         self.rows = [f"{q}_{a}" for q in "rzqxu" for a in "xyz"] + [f"d{k}" for k in range(6)] + ["m"]
         self.rows += [f"h{k}" for k in range(6)] if own else []
         vector = f"np.empty(3 * (M[0] + {2 * LANES}), R)"
         tiles = f"np.empty({len(self.rows) * APART} * (M[0] // {BLOCK} + 1), R)"
+        blocks = [name for kind in kinds for name in (*kind.arrays, f"{kind.name}_K", f"{kind.name}_R")]
+        self.matrix = ", ".join(["base", "n", "slices", *blocks, *["Q"] * projected])
+        given = ", ".join([*deriv.binder.arrays, self.matrix])
+        self.calls = [
+            f"condense({given}, g, U, V)",
+            f"gradients({self.matrix}, guess, warm, load, dv, V, way, let, terms, part)",
+        ]
         self.scratch = {"V": tiles, "terms": "np.empty(M[0])", "way": vector, "let": vector}
 
     @property
     def text(self) -> str:
         """The functions."""
-        return "".join([self._fold(), self._condense(), self._image(), self._gradients()])
+        parts = [self._fold(), self._condense(), self._image(), self._eased(), self._turned(), self._gradients()]
+        return "".join(parts)
 
     def _function(self, name: str, arguments: str, lines: Sequence[str]) -> str:
         head = [f"@njit({self.deriv.flags})", f"def {name}({arguments}):"]
@@ -180,7 +187,7 @@ class Gradients:
             *self._blocks(self._slices([*fill, *self._slice(particle)]), summed=False),
             "return 0",
         ]
-        return self._function("condense", f"{self.shared}, g, U, V", lines)
+        return self._function("condense", f"{', '.join(self.deriv.binder.arrays)}, {self.matrix}, g, U, V", lines)
 
     def _image(self) -> str:
         """q = M p - gamma df/dv p - gamma^2 df/dx p in the tiles, and p . q; u is p where contacts let it go."""
@@ -211,7 +218,7 @@ class Gradients:
         own += [f"{self._at(f'q_{a}')} = q_{a}" for a in "xyz"]
         own.append(f"terms[np.uintp(begin + l)] = {_dot('p', 'q')}")
         body = [*self._apart(), *self._blocks(self._slices([*lines, *rest, *self._slice(own)])), "return total"]
-        return self._function("image_of", f"{self.shared}, p, u, V, terms, part", body)
+        return self._function("image_of", f"{self.matrix}, p, u, V, terms, part", body)
 
     def _times(self, kind: Kind, blocks: str, far: int, at: Callable[[str], str]) -> list[str]:
         """Statements that add a block, with its numbers so far from each other, times the vector at its column."""
@@ -229,71 +236,72 @@ class Gradients:
     def _apart(self) -> list[str]:
         return [f"apart = np.uintp(n + {2 * LANES})", "twice = np.uintp(2) * apart"]
 
-    def _precondition(self, residual: Sequence[str]) -> list[str]:
-        """z = D r in lanes, and r . z; the residual is given by expressions."""
-        lines = [f"r_{a} = {r}" for a, r in zip("xyz", residual, strict=True)]
+    def _eased(self) -> str:
+        """r = r - alpha q, z = D r, and r . z."""
+        lines = [f"r_{a} = {self._at(f'r_{a}')} - alpha * {self._at(f'q_{a}')}" for a in "xyz"]
         for i, a in enumerate("xyz"):
-            lines.append(
-                f"z_{a} = " + " + ".join(f"{self._at(f'd{upper(i, j)}')} * r_{c}" for j, c in enumerate("xyz"))
-            )
+            row = (f"{self._at(f'd{upper(i, j)}')} * r_{c}" for j, c in enumerate("xyz"))
+            lines.append(f"z_{a} = {' + '.join(row)}")
         lines += [f"{self._at(f'{q}_{a}')} = {q}_{a}" for q in "rz" for a in "xyz"]
-        return [*lines, f"terms[np.uintp(i)] = {_dot('r', 'z')}"]
+        lines.append(f"terms[np.uintp(i)] = {_dot('r', 'z')}")
+        return self._function("eased", "n, alpha, V, terms, part", [*self._blocks(self._lanes(lines)), "return total"])
+
+    def _turned(self) -> str:
+        """x = x + alpha p, p = z + beta p, and u."""
+        lines = [f"o = np.uintp({LANES} + i)"]
+        for a, o in PLACE.items():
+            lines += [f"p_{a} = p[{o}]", f"{self._at(f'x_{a}')} = {self._at(f'x_{a}')} + alpha * p_{a}"]
+            lines.append(f"p[{o}] = {self._at(f'z_{a}')} + beta * p_{a}")
+        arguments = "n, alpha, beta, V, p" + ", u, Q" * self.projected
+        lines = [*self._apart(), *self._blocks(self._lanes([*lines, *self._project()]), summed=False), "return 0"]
+        return self._function("turned", arguments, lines)
+
+    def _project(self) -> list[str]:
+        """u = Q p."""
+        if not self.projected:
+            return []
+        vectors = ([f"{v}[{o}]" for o in PLACE.values()] for v in "pu")
+        return [*read("Q", "i", "s"), *times("s", *vectors)]
 
     def _gradients(self) -> str:
-        """Conjugate gradients as in `solvers.linear.ConjugateGradients`; returns the number of iterations."""
+        """The iteration; returns how often it was made."""
         float32 = self.deriv.binder.dtype == "float32"
         tolerance = max(self.solver.cg_tolerance, 1e-6 if float32 else 0.0)  # it cannot end below round-off
-        project = []
-        if self.projected:
-            project = [
-                *read("Q", "i", "s"),
-                *times("s", [f"p[{o}]" for o in PLACE.values()], [f"u[{o}]" for o in PLACE.values()]),
-            ]
-        here = f"o = np.uintp({LANES} + i)"
-        begin = self._precondition([f"{self._at('m')} * load[np.uintp(3 * i + {k})]" for k in AXES])
-        cold = [f"{self._at(f'x_{a}')} = R(0)" for a in "xyz"]
-        guess = [here]
+        begin = [f"o = np.uintp({LANES} + i)"]
         for k, (a, o) in enumerate(PLACE.items()):
-            guess += [f"p[{o}] = warm[np.uintp(3 * i + {k})]", f"{self._at(f'x_{a}')} = p[{o}]"]
-        less = self._precondition([f"{self._at(f'r_{a}')} - {self._at(f'q_{a}')}" for a in "xyz"])
-        direction = [here, *(f"p[{o}] = {self._at(f'z_{a}')}" for a, o in PLACE.items())]
-        update = self._precondition([f"{self._at(f'r_{a}')} - alpha * {self._at(f'q_{a}')}" for a in "xyz"])
-        turn = [here]
-        for a, o in PLACE.items():
-            turn += [f"p_{a} = p[{o}]", f"{self._at(f'x_{a}')} = {self._at(f'x_{a}')} + alpha * p_{a}"]
-            turn += [f"p[{o}] = {self._at(f'z_{a}')} + beta * p_{a}"]
-        margin = [f"{v}[{o}] = R(0)" for v in ("p", "u")[: 1 + self.projected] for o in PLACE.values()]
-        call = f"image_of({self.shared}, p, u, V, terms, part)"
+            j = f"np.uintp(3 * i + {k})"
+            begin += [f"{self._at(f'r_{a}')} = {self._at('m')} * load[{j}]", f"{self._at(f'q_{a}')} = R(0)"]
+            begin += [f"p[{o}] = warm[{j}] if guess else R(0)", f"{self._at(f'x_{a}')} = p[{o}]"]
+        end = [f"dv[np.uintp(3 * i + {k})] = {self._at(f'x_{a}')}" for k, a in enumerate("xyz")]
+        margin = [f"{v}[{o}] = R(0)" for v in "pu"[: 1 + self.projected] for o in PLACE.values()]
+        image = f"image_of({self.matrix}, p, u, V, terms, part)"
+        turn = "turned(n, {0}, V, p" + ", u, Q)" * self.projected + ")" * (not self.projected)
         lines = [
             *self._apart(),
-            f"for k in range({2 * LANES}):",
-            *indented([f"o = np.uintp(k if k < {LANES} else n + k)", *margin], 1),
-            *self._blocks(self._lanes([*begin, *cold])),
-            f"goal = {tolerance * tolerance!r} * total",
-            "rho = total",
+            f"if n >= {LANES}:",
+            f"    for k in range({2 * LANES}):",
+            *indented([f"o = np.uintp(k if k < {LANES} else n + k)", *margin], 2),
+            *self._blocks(self._lanes([*begin, *self._project()]), summed=False),
+            "rho = eased(n, R(0), V, terms, part)",
+            f"goal = {tolerance * tolerance!r} * rho",
             "if guess:",
-            *indented(self._blocks(self._lanes([*guess, *project]), summed=False), 1),
-            f"    {call}",
-            *indented(self._blocks(self._lanes(less)), 1),
-            "    rho = total",
-            *self._blocks(self._lanes([*direction, *project]), summed=False),
+            f"    {image}",
+            "    rho = eased(n, R(1), V, terms, part)",
+            turn.format("R(0), R(0)"),
             "count = 0",
             f"while rho > goal and count < min({ConjugateGradients.restarts} * 3 * n, {ConjugateGradients.most}):",
-            f"    curvature = {call}",
+            f"    curvature = {image}",
             "    if curvature == 0.0:",
             "        break",
             "    alpha = R(rho / curvature)",
-            *indented(self._blocks(self._lanes(update)), 1),
-            "    beta = R(total / rho)",
-            *indented(self._blocks(self._lanes([*turn, *project]), summed=False), 1),
+            "    total = eased(n, alpha, V, terms, part)",
+            f"    {turn.format('alpha, R(total / rho)')}",
             "    rho = total",
             "    count += 1",
-            *self._blocks(
-                self._lanes([f"dv[3 * i + {k}] = {self._at(f'x_{a}')}" for k, a in enumerate("xyz")]), summed=False
-            ),
+            *self._blocks(self._lanes(end), summed=False),
             "return count",
         ]
-        return self._function("gradients", f"{self.shared}, guess, warm, load, dv, V, p, u, terms, part", lines)
+        return self._function("gradients", f"{self.matrix}, guess, warm, load, dv, V, p, u, terms, part", lines)
 
 
 def upper(i: int, j: int) -> int:

@@ -92,7 +92,7 @@ class _Printer:
         scratch |= {"Q": "np.empty(9 * M[0], R)"} if self.projected else {}
         looks = self.deriv.binder.functions
         jacobian, own = self._jacobian()
-        gradients = Gradients(self.deriv, self.solver, self.kinds, self.shared, own, self.projected)
+        gradients = Gradients(self.deriv, self.solver, self.kinds, own, self.projected)
         if self.linked:
             scratch |= gradients.scratch
         if self.eliminates:
@@ -110,7 +110,7 @@ class _Printer:
             ]
         if self.linked:
             parts.append(gradients.text)
-        parts.append(self._function("implicit", state, self._newton()))
+        parts.append(self._function("implicit", state, self._newton(gradients)))
         more = self.deriv.binder.functions[len(looks) :]  # derivatives look up what laws do not
         lines = [f"status |= implicit({state})"]
         functions = more + "".join(parts)
@@ -278,7 +278,7 @@ class _Printer:
         gone = "w != 0 and largest(1, load, part) != 0.0"
         return [*lines, *body, *(f"dv[{i}] = {out} if {gone} else R(0)" for i, out in enumerate(outputs))]
 
-    def _newton(self) -> list[str]:
+    def _newton(self, gradients: Gradients) -> list[str]:
         """One step, see `solvers.newton.Newton` and `solvers.implicit.Implicit.step`."""
         solver, second, loop, dtype = self.solver, self.second, self.deriv.loop, self.dtype
         every = f"for j in {loop}(3 * n):"
@@ -306,7 +306,7 @@ class _Printer:
         ]
         alone = self._alone()
         if self.linked:
-            call = f"gradients({self.shared}, guess, warm, load, dv, V, way, let, terms, part)"
+            condense, solve = gradients.calls
             iteration += [
                 "if n == 1:",
                 *indented(alone, 1),
@@ -318,8 +318,8 @@ class _Printer:
                 *self._elimination(),
                 "else:",
                 "    guess = first and largest(n, warm, part) != 0.0",
-                f"    condense({self.shared}, g, U, V)",
-                f"    done[4] += {call}",
+                f"    {condense}",
+                f"    done[4] += {solve}",
             ]
         else:
             iteration += alone
