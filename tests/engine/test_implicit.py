@@ -207,6 +207,19 @@ def test_large_islands_agree_with_the_reference(make: Any) -> None:
     np.testing.assert_allclose(ours.get_state(), theirs.get_state(), rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("newton", ["full", "one"])
+def test_direct_means_direct(newton: Any) -> None:
+    """Chains are eliminated, also for a single step; islands that are not narrow are left to the reference path."""
+    ours, theirs = chains(), chains()
+    solver = pm.ImplicitEuler("direct", newton, tolerance=1e-13)
+    outcome, _ = advanced(ours, solver, 20)
+    reference(theirs, solver, 20)
+    assert outcome.good
+    assert outcome.stats.cg_iterations == 0
+    np.testing.assert_allclose(ours.get_state(), theirs.get_state(), rtol=0, atol=1e-12)
+    assert not advanced(fabric(), solver, 1)[0].good
+
+
 def test_a_run_may_be_cut_anywhere() -> None:
     """The memory carries the warm start and the history of BDF2 over."""
     whole, cut = chains(), chains()

@@ -1,9 +1,10 @@
 """Prints the step of an implicit solver for one island: Newton's method around conjugate gradients without a matrix.
 
-The exact Jacobian of each element is evaluated once for each iteration of Newton's method into a buffer of 3x3 blocks;
-a product with the matrix is then one pass in which every particle gathers from its elements. An island whose elements
-join near rows only, a chain, is solved by elimination within the band of its matrix, and a particle alone by the text
-of `solvers.linear.three`. The operations are those of `solvers.newton` and `solvers.linear`, in order.
+The exact Jacobian of each element is evaluated once for each iteration of Newton's method into a buffer of 3x3 blocks,
+from which `gradients` solves for the correction. An island whose elements join near rows only, a chain, is solved by
+elimination within the band of its matrix, and a particle alone by the text of `solvers.linear.three`. The operations
+are those of `solvers.newton` and `solvers.linear`, in order; where factors of a whole matrix are asked for, an island
+that is no chain says that it is not solved, and the reference path takes over.
 """
 
 from __future__ import annotations
@@ -73,7 +74,9 @@ class _Printer:
         self.kinds = _kinds(self.families)
         self.linked = bool(self.families)
         # Conjugate gradients see the symmetric part of the matrix alone, and one step of Newton's method shows that.
-        self.eliminates = self.linked and solver.linear_solver != "cg" and solver.newton == "full"
+        self.direct = solver.linear_solver == "direct"
+        auto = solver.linear_solver == "auto" and solver.newton == "full"
+        self.eliminates = self.linked and (self.direct or auto)
         self.arrays = [array for kind in self.kinds for array in kind.arrays]
         buffers = [f"{kind.name}_{b}" for kind in self.kinds for b in "KR"]
         self.shared = ", ".join(
@@ -108,7 +111,7 @@ class _Printer:
                 self._assemble(),
                 self._function("eliminate", "rows, m, W, y", ELIMINATE.splitlines()),
             ]
-        if self.linked:
+        if self.linked and not self.direct:
             parts.append(gradients.text)
         parts.append(self._function("implicit", state, self._newton(gradients)))
         more = self.deriv.binder.functions[len(looks) :]  # derivatives look up what laws do not
@@ -307,6 +310,12 @@ class _Printer:
         alone = self._alone()
         if self.linked:
             condense, solve = gradients.calls
+            gradual = [
+                "    guess = first and largest(n, warm, part) != 0.0",
+                f"    {condense}",
+                f"    done[4] += {solve}",
+            ]
+            wide = [f"    return status | {NOT_SOLVED}"]  # factors of a whole matrix: the reference path has them
             iteration += [
                 "if n == 1:",
                 *indented(alone, 1),
@@ -317,9 +326,7 @@ class _Printer:
             iteration += [
                 *self._elimination(),
                 "else:",
-                "    guess = first and largest(n, warm, part) != 0.0",
-                f"    {condense}",
-                f"    done[4] += {solve}",
+                *(wide if self.direct else gradual),
             ]
         else:
             iteration += alone
