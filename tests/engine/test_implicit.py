@@ -16,7 +16,7 @@ from pointmass.engine.reference import ReferenceEngine
 from pointmass.solvers.base import Memory
 
 SOLVERS = [pm.ImplicitEuler, pm.ImplicitMidpoint, pm.BDF2]
-SHARP = {"tolerance": 1e-13, "cg_tolerance": 1e-13}
+SHARP: dict[str, Any] = {"tolerance": 1e-13, "cg_tolerance": 1e-13}
 DT = 1 / 60
 
 
@@ -149,17 +149,75 @@ def net() -> pm.ParticleSystem:
     return pm.ParticleSystem(particles, [pm.Gravity(), pm.Drag(0.01), pm.Springs(pairs, 50.0, 0.05)])
 
 
-def test_compiled_kernels_give_the_bits_of_plain_python() -> None:
+def fabric() -> pm.ParticleSystem:
+    """More than a block of particles, whose blocks are in runs and beside them, of both kinds."""
+    side = 17
+    grid = np.arange(side * side).reshape(side, side)
+    ends = ((grid[:, :-1], grid[:, 1:]), (grid[:-1], grid[1:]), (grid[:-1, :-1], grid[1:, 1:]))
+    pairs = np.concatenate([np.c_[a.ravel(), b.ravel()] for a, b in ends])
+    rng = np.random.default_rng(8)
+    x = np.stack([grid % side / side, 0.0 * grid, grid // side / side], axis=-1).reshape(-1, 3)
+    x[:, 1] = 0.05 * rng.uniform(-1, 1, len(x))
+    particles = pm.Particles(x, m=rng.uniform(0.01, 0.02, len(x)))
+    particles.pin([0, side - 1])
+    forces = [pm.Gravity(), pm.Springs(pairs, 50.0, 0.05), pm.Springs(pairs[::3], 9.0), tether(pairs=pairs[::2])]
+    return pm.ParticleSystem(particles, forces)
+
+
+def carpet() -> pm.ParticleSystem:
+    """The same with some on the ground, one of its forces switched off, and bending."""
+    system = fabric()
+    particles, grid = system.particles, np.arange(289).reshape(17, 17)
+    bent = np.stack([grid[:, :-2], grid[:, 1:-1], grid[:, 2:]], axis=-1).reshape(-1, 3)
+    system.forces[2].enabled = False
+    lying = particles.x[:, 0] > 0.7
+    particles.x[:, 1] += 0.2
+    particles.x[lying, 1] = 0.0
+    forces = [*system.forces, pm.Angles(bent, 0.01), pm.Drag(0.01)]
+    return pm.ParticleSystem(particles, forces, [pm.Plane(friction=0.3)])
+
+
+@pytest.mark.parametrize(
+    ("make", "solver", "steps", "ways"),
+    [
+        (net, pm.ImplicitEuler("cg"), 5, [False, True]),
+        (fabric, pm.ImplicitEuler(newton="one", cg_tolerance=1e-2), 1, [True]),
+    ],
+)
+def test_compiled_kernels_give_the_bits_of_plain_python(make: Any, solver: Any, steps: int, ways: list[bool]) -> None:
     """Also where all threads work on one island, by conjugate gradients."""
-    plain = net()
-    outcome, _ = advanced(plain, pm.ImplicitEuler("cg"), 5)
+    plain = make()
+    outcome, _ = advanced(plain, solver, steps)
     assert outcome.good
     assert outcome.stats.cg_iterations > 0
-    for parallel in (False, True):
-        system = net()
-        other, _ = advanced(system, pm.ImplicitEuler("cg"), 5, parallel, jit=True)
+    for parallel in ways:
+        system = make()
+        other, _ = advanced(system, solver, steps, parallel, jit=True)
         assert system.get_state().tobytes() == plain.get_state().tobytes()
         assert other.stats == outcome.stats
+
+
+@pytest.mark.parametrize("make", [fabric, carpet])
+def test_large_islands_agree_with_the_reference(make: Any) -> None:
+    ours, theirs = make(), make()
+    solver = pm.BDF2(newton="one", cg_tolerance=1e-13)
+    outcome, _ = advanced(ours, solver, 2)
+    reference(theirs, solver, 2)
+    assert outcome.good
+    np.testing.assert_allclose(ours.get_state(), theirs.get_state(), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("newton", ["full", "one"])
+def test_direct_means_direct(newton: Any) -> None:
+    """Chains are eliminated, also for a single step; islands that are not narrow are left to the reference path."""
+    ours, theirs = chains(), chains()
+    solver = pm.ImplicitEuler("direct", newton, tolerance=1e-13)
+    outcome, _ = advanced(ours, solver, 20)
+    reference(theirs, solver, 20)
+    assert outcome.good
+    assert outcome.stats.cg_iterations == 0
+    np.testing.assert_allclose(ours.get_state(), theirs.get_state(), rtol=0, atol=1e-12)
+    assert not advanced(fabric(), solver, 1)[0].good
 
 
 def test_a_run_may_be_cut_anywhere() -> None:

@@ -35,6 +35,17 @@ for force in (pm.Gravitation(1.0, eps=0.1), pm.SoftSphere()):
     sim = pm.Simulation(pm.ParticleSystem(particles, [force]), "leapfrog", 1e-3, compiled=True)
     sim.step(10)
     hash.update(particles.x.tobytes() + particles.v.tobytes())
+
+side = 70
+grid = np.arange(side * side).reshape(side, side)
+pairs = np.concatenate([np.c_[grid[:, :-1].ravel(), grid[:, 1:].ravel()], np.c_[grid[:-1].ravel(), grid[1:].ravel()]])
+x = np.stack([grid % side, 0 * grid, grid // side], axis=-1).reshape(-1, 3) / side
+particles = pm.Particles(x, m=1e-3)
+particles.pin([0, side - 1])
+system = pm.ParticleSystem(particles, [pm.Gravity(), pm.Springs(pairs, 5.0, rest=0.95 / side)])
+sim = pm.Simulation(system, pm.ImplicitEuler(newton="one", cg_tolerance=1e-3), 1 / 60, compiled=True)
+sim.step(3)
+hash.update(particles.x.tobytes())
 print(hash.hexdigest())
 """
 

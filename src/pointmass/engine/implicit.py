@@ -1,9 +1,10 @@
 """Prints the step of an implicit solver for one island: Newton's method around conjugate gradients without a matrix.
 
-The exact Jacobian of each element is evaluated once for each iteration of Newton's method into a buffer of 3x3 blocks;
-a product with the matrix is then one pass in which every particle gathers from its elements. An island whose elements
-join near rows only, a chain, is solved by elimination within the band of its matrix, and a particle alone by the text
-of `solvers.linear.three`. The operations are those of `solvers.newton` and `solvers.linear`, in order.
+The exact Jacobian of each element is evaluated once for each iteration of Newton's method into a buffer of 3x3 blocks,
+from which `gradients` solves for the correction. An island whose elements join near rows only, a chain, is solved by
+elimination within the band of its matrix, and a particle alone by the text of `solvers.linear.three`. The operations
+are those of `solvers.newton` and `solvers.linear`, in order; where factors of a whole matrix are asked for, an island
+that is no chain says that it is not solved, and the reference path takes over.
 """
 
 from __future__ import annotations
@@ -12,25 +13,23 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pointmass.engine.binding import Text
+from pointmass.engine.blocks import LANES, Kind
 from pointmass.engine.forces import UNARY, Deriv, Elements
+from pointmass.engine.gradients import AXES, BLOCK, SQUARE, UPPER, Gradients, read, sandwich, times
 from pointmass.engine.printing import indented, literal, statements
 from pointmass.engine.steps import StepText
 from pointmass.laws.elements import ConstraintForce, ElementForce
 from pointmass.laws.unary import UnaryForce
 from pointmass.solvers.bdf2 import BDF2, LARGEST_RATIO
 from pointmass.solvers.implicit import Implicit
-from pointmass.solvers.linear import ConjugateGradients, traced_block_inverse, traced_three
+from pointmass.solvers.linear import traced_three
 from pointmass.solvers.newton import GROWTH, HALVINGS, ROUNDINGS
 from pointmass.tracing.columns import expanded
 from pointmass.tracing.program import Program
 from pointmass.tracing.trace import Traced, trace, vector_names
 
 NOT_SOLVED = 8  # bit of the status of an island
-BLOCK = 256  # particles whose numbers are added up in one go: sums have the same shape on any number of threads
 BAND, LONGEST = 16, 8192  # an island is eliminated up to this distance of rows within an element, and so many rows
-UPPER = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]  # entries that are kept of a symmetric 3x3 block
-AXES = range(3)
-SQUARE = [(i, j) for i in AXES for j in AXES]
 ELIMINATE = """for j in range(rows):
     last, end = min(j + m + 1, rows), min(j + 2 * m + 1, rows)
     at = j * (3 * m + 1) + m - j
@@ -72,70 +71,69 @@ class _Printer:
         self.system, self.second = deriv.system, deriv.order == 2
         self.dtype = deriv.binder.dtype
         self.families = [_Family(deriv, f) for f in deriv.families]
+        self.kinds = _kinds(self.families)
         self.linked = bool(self.families)
         # Conjugate gradients see the symmetric part of the matrix alone, and one step of Newton's method shows that.
-        self.eliminates = self.linked and solver.linear_solver != "cg" and solver.newton == "full"
-        blocks = [f"K{f.number}" for f in self.families]
-        self.shared = ", ".join([deriv.call, *blocks, *["Q", "V"] * self.projected])
+        self.direct = solver.linear_solver == "direct"
+        auto = solver.linear_solver == "auto" and solver.newton == "full"
+        self.eliminates = self.linked and (self.direct or auto)
+        self.arrays = [array for kind in self.kinds for array in kind.arrays]
+        buffers = [f"{kind.name}_{b}" for kind in self.kinds for b in "KR"]
+        self.shared = ", ".join(
+            [deriv.call, *self.arrays, *["slices"] * self.linked, *buffers, *["Q", "Qw"] * self.projected]
+        )
 
     def text(self) -> StepText:
         """Everything."""
-        scratch = {f"K{f.number}": f"np.empty({f.size} * M[{k + 1}], R)" for k, f in enumerate(self.families)}
+        scratch: dict[str, str] = {}
+        for k, kind in enumerate(self.kinds):
+            most = " + ".join(f"{self.families[j].size} * M[{j + 1}]" for j in kind.families)
+            scratch[f"{kind.name}_K"] = f"np.empty({most}, R)"
+            scratch[f"{kind.name}_R"] = f"np.empty({kind.size * LANES} * M[{len(self.families) + k + 1}], R)"
         scratch |= {"U": "np.empty(18 * M[0], R)", "part": f"np.empty(M[0] // {BLOCK} + 1)"}
         work = ["gap", "load", "dv", "lack", "rate", "xs", "xt", "vs", "vt", "zx", "zv"]
-        scratch |= {"Q": "np.empty(9 * M[0], R)", "V": "np.empty(18 * M[0], R)"} if self.projected else {}
+        scratch |= {"Q": "np.empty(9 * M[0], R)", "Qw": "np.empty(18 * M[0], R)"} if self.projected else {}
+        looks = self.deriv.binder.functions
+        jacobian, own = self._jacobian()
+        gradients = Gradients(self.deriv, self.solver, self.kinds, own, self.projected)
         if self.linked:
-            scratch |= dict.fromkeys("HD", "np.empty(6 * M[0], R)")
-            work += ["way", "image", "eased", "let"]
+            scratch |= gradients.scratch
         if self.eliminates:
             scratch["W"] = f"np.empty({3 * (3 * (3 * BAND + 2) + 1)} * min(M[0], {LONGEST}), R)"
         history = ["x_before", "v_before"][: self.deriv.order] if isinstance(self.solver, BDF2) else []
         memory = ["warm"] * self.linked + history
         state = f"{self.shared}, t, h, x, v, x1, v1, {', '.join([*scratch, *work, *memory])}, h_before, done"
         state = ", ".join(dict.fromkeys(state.split(", ")))  # blocks are among the shared ones already
-        looks = self.deriv.binder.functions
-        parts = [self._largest(), self._jacobian()]
+        parts = [self._largest(), jacobian]
         if self.eliminates:
             parts += [
                 self._distance(),
                 self._assemble(),
                 self._function("eliminate", "rows, m, W, y", ELIMINATE.splitlines()),
             ]
-        if self.linked:
-            parts += [self._condense(), self._product(), self._gradients()]
-        parts.append(self._function("implicit", state, self._newton()))
+        if self.linked and not self.direct:
+            parts.append(gradients.text)
+        parts.append(self._function("implicit", state, self._newton(gradients)))
         more = self.deriv.binder.functions[len(looks) :]  # derivatives look up what laws do not
         lines = [f"status |= implicit({state})"]
-        return StepText(work, lines, 0, functions=more + "".join(parts), scratch=scratch, memory=memory)
+        functions = more + "".join(parts)
+        return StepText(work, lines, 0, functions=functions, scratch=scratch, memory=memory, kinds=self.kinds)
 
     def _function(self, name: str, arguments: str, lines: Sequence[str]) -> str:
         return "\n".join(
             [f"@njit({self.deriv.flags})", f"def {name}({arguments}):", *indented(list(lines), 1), "", "", ""]
         )
 
-    def _over(self, particle: Sequence[str], total: str = "mine") -> list[str]:
-        """A loop over the particles in blocks, each with a result of its own in `part`."""
-        return [
-            f"for block in {self.deriv.loop}((n + {BLOCK - 1}) // {BLOCK}):",
-            f"    {total} = 0.0",
-            f"    for i in range({BLOCK} * block, min(n, {BLOCK} * block + {BLOCK})):",
-            *indented(list(particle), 2),
-            f"    part[block] = {total}",
-        ]
-
-    def _sum(self) -> list[str]:
-        return ["total = 0.0", f"for block in range((n + {BLOCK - 1}) // {BLOCK}):", "    total = total + part[block]"]
-
     def _largest(self) -> str:
         """Largest size of the first 3n numbers of an array, NaN where one is."""
         worst = "{1} = {0} if {0} > {1} or {0} != {0} else {1}"
-        particle = [
-            "for q in range(3 * i, 3 * i + 3):",
-            "    size = np.float64(abs(a[q]))",
-            f"    {worst.format('size', 'mine')}",
-        ]
         lines = [
-            *self._over(particle),
+            f"for block in {self.deriv.loop}((n + {BLOCK - 1}) // {BLOCK}):",
+            "    mine = 0.0",
+            f"    for q in range({3 * BLOCK} * block, min(3 * n, {3 * BLOCK} * block + {3 * BLOCK})):",
+            "        size = np.float64(abs(a[q]))",
+            f"        {worst.format('size', 'mine')}",
+            "    part[block] = mine",
             "most = 0.0",
             f"for block in range((n + {BLOCK - 1}) // {BLOCK}):",
             f"    {worst.format('part[block]', 'most')}",
@@ -145,8 +143,9 @@ class _Printer:
 
     # ------------------------------------------------------------------------------------------------ the Jacobian
 
-    def _jacobian(self) -> str:
-        """Blocks of the elements into K, those of particles into U (df/dx, df/dv), and k = w df/dx gap.
+    def _jacobian(self) -> tuple[str, bool]:
+        """Blocks of the elements into K, those of particles into U (df/dx, df/dv), and k = w df/dx gap; and whether
+        forces on particles have any.
 
         K is gamma df/dv + gamma^2 df/dx, made symmetric unless it is wanted as a whole.
         """
@@ -161,11 +160,11 @@ class _Printer:
             assert self.deriv.contact is not None
             first = [
                 f"for i in {self.deriv.loop}(n):",
-                f"    project(F, K, i * {self.deriv.contact.record}, Q[9 * i:9 * i + 9], V[18 * i:18 * i + 18])",
+                f"    project(F, K, i * {self.deriv.contact.record}, Q[9 * i:9 * i + 9], Qw[18 * i:18 * i + 18])",
             ]
         if self.projected and self.linked:
             first += [f"for i in {self.deriv.loop}(n):", *indented(_projected("Q", "gap", "u"), 1)]
-        timed, particle = self._own_blocks()
+        timed, particle, own = self._own_blocks()
         lines = [
             *self.deriv.binder.numbers.lines(),
             "status = 0",
@@ -179,11 +178,11 @@ class _Printer:
             "return status",
         ]
         u = ", u" * (self.linked and self.projected)
-        return self._function("jacobian", f"{self.shared}, t, g, whole, x, v, gap, U, k{u}", lines)
+        return self._function("jacobian", f"{self.shared}, t, g, whole, x, v, gap, U, k{u}", lines), own
 
-    def _own_blocks(self) -> tuple[list[str], list[str]]:
-        """Statements of the time, and those for particle i."""
-        binder = self.deriv.binder
+    def _own_blocks(self) -> tuple[list[str], list[str], bool]:
+        """Statements of the time, those for particle i, and whether any of its blocks is not 0."""
+        binder, found = self.deriv.binder, False
         at_time: list[str] = []
         lines = ["g_ = base + i", *_offsets()]
         sums = [f"{q}{i}{j}" for q in "ab" for i in AXES for j in AXES]
@@ -196,6 +195,7 @@ class _Printer:
             text = binder.law(traced, force, {**UNARY, **mass, "t": "R(t)"}, "g_", binder.particle, f"d{number}")
             if all(out == literal(0.0, self.dtype) for out in text.outputs):
                 continue
+            found = True
             at_time += text.at_time
             acts = binder.selected(force, "g_")
             lines += [f"# {force.name}", *text.lines]
@@ -203,7 +203,7 @@ class _Printer:
                 if out != literal(0.0, self.dtype):
                     lines.append(f"{q}{i}{j} = {q}{i}{j} + {out if acts is None else f'({out} if {acts} else R(0))'}")
         if self.projected and self.second:
-            lines += [*_read("Q", "i", "s"), *_sandwich("a"), *_sandwich("b")]
+            lines += [*read("Q", "i", "s"), *sandwich("a"), *sandwich("b")]
         lines += ["b = np.uintp(18 * i)"]
         lines += [f"U[b + np.uintp({k})] = {s}" for k, s in enumerate(sums)]
         if self.second:
@@ -211,139 +211,11 @@ class _Printer:
             for family in self.families:
                 lines += family.gather()
             if self.projected:
-                lines += _times("s", ("f_x", "f_y", "f_z"), ("f_x", "f_y", "f_z"))
+                lines += times("s", ("f_x", "f_y", "f_z"), ("f_x", "f_y", "f_z"))
             for i, a in enumerate("xyz"):
                 own = " + ".join(f"(w * a{i}{j}) * gap[o_{c}]" for j, c in enumerate("xyz"))
                 lines.append(f"k[o_{a}] = w * f_{a} + ({own})")
-        return at_time, lines
-
-    # ------------------------------------------------------------------------------------------------ many particles
-
-    def _condense(self) -> str:
-        """H, the symmetric part of gamma df/dv + gamma^2 df/dx of the particles' own forces, and D, the inverses of the
-        diagonal blocks; upper triangles."""
-        inverse, outputs = statements(
-            expanded(traced_block_inverse().program), {f"d{i}{j}": f"d{i}{j}" for i, j in UPPER}, "inv_", self.dtype
-        )
-        lines = ["g_ = base + i", f"w = {self.deriv.binder.attribute('w', 'g_')}"]
-        lines += [f"m = {self.deriv.binder.attribute('m', 'g_')}", "b = np.uintp(18 * i)", "c = np.uintp(6 * i)"]
-        for i, j in UPPER:
-            a, d = (
-                f"R(0.5) * (U[b + np.uintp({off + 3 * i + j})] + U[b + np.uintp({off + 3 * j + i})])" for off in (0, 9)
-            )
-            lines.append(f"h{i}{j} = g * ({d}) + gg * ({a})")
-        names = [f"e{i}{j}" for i, j in UPPER]
-        lines += [f"{e} = R(0)" for e in names]
-        for family in self.families:
-            lines += family.diagonal()
-        if self.projected:
-            lines += [f"e{j}{i} = e{i}{j}" for i, j in UPPER if i != j]
-            lines += [*_read("Q", "i", "s"), *_sandwich("e")]
-        lines += [f"d{i}{j} = {'m' if i == j else 'R(0)'} - h{i}{j} - e{i}{j}" for i, j in UPPER]
-        lines += inverse
-        for k, ((i, j), out) in enumerate(zip(UPPER, outputs, strict=True)):
-            lines += [f"H[c + np.uintp({k})] = h{i}{j}", f"D[c + np.uintp({k})] = {out} if w != 0 else R(0)"]
-        lines = [
-            *self.deriv.binder.numbers.lines(),
-            "gg = g * g",
-            f"for i in {self.deriv.loop}(n):",
-            *indented(lines, 1),
-        ]
-        return self._function("condense", f"{self.shared}, g, U, H, D", [*lines, "return 0"])
-
-    def _product(self) -> str:
-        """q = M p - gamma df/dv p - gamma^2 df/dx p, and p . q; u is p where contacts let it go."""
-        w, m = (self.deriv.binder.attribute(name, "g_") for name in "wm")
-        source = "u" if self.projected else "p"
-        particle = [
-            "g_ = base + i",
-            *_offsets(),
-            f"if {w} == 0:",
-            *(f"    q[o_{a}] = R(0)" for a in "xyz"),
-            "    continue",
-            *(f"u_{a} = {source}[o_{a}]" for a in "xyz"),
-            *(f"f_{a} = R(0)" for a in "xyz"),
-        ]
-        for family in self.families:
-            particle += family.product(source)
-        if self.projected:
-            particle += [*_read("Q", "i", "s"), *_times("s", ("f_x", "f_y", "f_z"), ("f_x", "f_y", "f_z"))]
-        particle += ["c = np.uintp(6 * i)", f"m = {m}", *(f"p_{a} = p[o_{a}]" for a in "xyz")]
-        for i, a in enumerate("xyz"):
-            own = " + ".join(f"H[c + np.uintp({_upper(i, j)})] * p_{b}" for j, b in enumerate("xyz"))
-            particle += [f"q_{a} = m * p_{a} - (f_{a} + ({own}))", f"q[o_{a}] = q_{a}"]
-        particle.append("mine = mine + (" + " + ".join(f"np.float64(p_{a}) * np.float64(q_{a})" for a in "xyz") + ")")
-        lines = [
-            *self.deriv.binder.numbers.lines(),
-            *self._over(particle),
-            *self._sum(),
-            "return total",
-        ]
-        return self._function("image_of", f"{self.shared}, H, p, u, q, part", lines)
-
-    def _gradients(self) -> str:
-        """Conjugate gradients as in `solvers.linear.ConjugateGradients`; returns the number of iterations."""
-        float32 = self.dtype == "float32"
-        tolerance = max(self.solver.cg_tolerance, 1e-6 if float32 else 0.0)  # it cannot end below round-off
-        m = self.deriv.binder.attribute("m", "base + i")
-        w = self.deriv.binder.attribute("w", "base + i")
-        project = _projected("Q", "p", "u") if self.projected else []
-        square = "(" + " + ".join(f"np.float64(r[o_{a}]) * np.float64(z[o_{a}])" for a in "xyz") + ")"
-        precondition = ["c = np.uintp(6 * i)"]
-        for i, a in enumerate("xyz"):
-            terms = " + ".join(f"D[c + np.uintp({_upper(i, j)})] * r[o_{b}]" for j, b in enumerate("xyz"))
-            precondition.append(f"z[o_{a}] = {terms}")
-        measure = [*precondition, f"mine = mine + {square}"]
-        begin = [
-            *_offsets(),
-            f"m = {m} if {w} != 0 else R(0)",
-            *(f"r[o_{a}] = m * load[o_{a}]" for a in "xyz"),
-            *measure,
-        ]
-        cold = [f"for j in {self.deriv.loop}(3 * n):", "    dv[j] = R(0)"]
-        guess = [f"for j in {self.deriv.loop}(3 * n):", "    dv[j] = warm[j]", "    p[j] = warm[j]"]
-        if self.projected:
-            guess += [f"for i in {self.deriv.loop}(n):", *indented([*_offsets(), *project], 1)]
-        source = "u" if self.projected else "p"
-        call = f"image_of({self.shared}, H, p, {source}, q, part)"
-        take = [*_offsets(), *(f"r[o_{a}] = r[o_{a}] - q[o_{a}]" for a in "xyz"), *measure]
-        direction = [*_offsets(), *(f"p[o_{a}] = z[o_{a}]" for a in "xyz"), *project]
-        update = [
-            *_offsets(),
-            *(f"dv[o_{a}] = dv[o_{a}] + alpha * p[o_{a}]" for a in "xyz"),
-            *(f"r[o_{a}] = r[o_{a}] - alpha * q[o_{a}]" for a in "xyz"),
-            *measure,
-        ]
-        turn = [*_offsets(), *(f"p[o_{a}] = z[o_{a}] + beta * p[o_{a}]" for a in "xyz"), *project]
-        lines = [
-            *self._over(begin),
-            *self._sum(),
-            f"goal = {tolerance * tolerance!r} * total",
-            "rho = total",
-            "if guess:",
-            *indented(guess, 1),
-            f"    total = {call}",
-            *indented([*self._over(take), *self._sum()], 1),
-            "    rho = total",
-            "else:",
-            *indented(cold, 1),
-            f"for i in {self.deriv.loop}(n):",
-            *indented(direction, 1),
-            "count = 0",
-            f"while rho > goal and count < min({ConjugateGradients.restarts} * 3 * n, {ConjugateGradients.most}):",
-            f"    curvature = {call}",
-            "    if curvature == 0.0:",
-            "        break",
-            "    alpha = R(rho / curvature)",
-            *indented([*self._over(update), *self._sum()], 1),
-            "    beta = R(total / rho)",
-            f"    for i in {self.deriv.loop}(n):",
-            *indented(turn, 2),
-            "    rho = total",
-            "    count += 1",
-            "return count",
-        ]
-        return self._function("gradients", f"{self.shared}, guess, warm, load, dv, r, H, D, p, q, z, u, part", lines)
+        return at_time, lines, found
 
     # ------------------------------------------------------------------------------------------------ chains
 
@@ -366,9 +238,9 @@ class _Printer:
             lines += family.assemble()
         if self.projected:  # blocks of the particles' own forces once more, which changes nothing
             block = [f"e{i}{c} = W[{_place(i, c, 'other')}]" for i, c in SQUARE]
-            inner = [*block, *_read("Q", "other", "o"), *_sandwich("e", "o")]
+            inner = [*block, *read("Q", "other", "o"), *sandwich("e", "o")]
             inner += [f"W[{_place(i, c, 'other')}] = e{i}{c}" for i, c in SQUARE]
-            lines += _read("Q", "i", "s")
+            lines += read("Q", "i", "s")
             lines += ["for other in range(max(0, i - distance), min(n, i + distance + 1)):", *indented(inner, 1)]
         lines += [
             f"mass = {m} if {w} != 0 else R(1)",
@@ -409,7 +281,7 @@ class _Printer:
         gone = "w != 0 and largest(1, load, part) != 0.0"
         return [*lines, *body, *(f"dv[{i}] = {out} if {gone} else R(0)" for i, out in enumerate(outputs))]
 
-    def _newton(self) -> list[str]:
+    def _newton(self, gradients: Gradients) -> list[str]:
         """One step, see `solvers.newton.Newton` and `solvers.implicit.Implicit.step`."""
         solver, second, loop, dtype = self.solver, self.second, self.deriv.loop, self.dtype
         every = f"for j in {loop}(3 * n):"
@@ -437,8 +309,13 @@ class _Printer:
         ]
         alone = self._alone()
         if self.linked:
-            scratch = "dv, lack, H, D, way, image, eased, let, part"
-            call = f"gradients({self.shared}, guess, warm, load, {scratch})"
+            condense, solve = gradients.calls
+            gradual = [
+                "    guess = first and largest(n, warm, part) != 0.0",
+                f"    {condense}",
+                f"    done[4] += {solve}",
+            ]
+            wide = [f"    return status | {NOT_SOLVED}"]  # factors of a whole matrix: the reference path has them
             iteration += [
                 "if n == 1:",
                 *indented(alone, 1),
@@ -449,9 +326,7 @@ class _Printer:
             iteration += [
                 *self._elimination(),
                 "else:",
-                "    guess = first and largest(n, warm, part) != 0.0",
-                f"    condense({self.shared}, g, U, H, D)",
-                f"    done[4] += {call}",
+                *(wide if self.direct else gradual),
             ]
         else:
             iteration += alone
@@ -558,7 +433,7 @@ class _Family:
     """A family of elements in the matrix.
 
     A pair whose force depends on the differences of its ends has one block for all four, df1/dx1 = -df1/dx2 = df2/dx2,
-    of which the upper triangle is kept; others have nodes x nodes blocks.
+    of which the upper triangle is kept; others have nodes x nodes blocks. All families of a kind share a buffer.
     """
 
     def __init__(self, deriv: Deriv, elements: Elements) -> None:
@@ -567,6 +442,8 @@ class _Family:
         self.switch = f"if {deriv.binder.switch(self.force)} != 0:"
         self.relative = is_relative(self.force)
         self.size = 9 if self.relative else 9 * self.nodes**2
+        self.blocks = f"{_kind(self.relative)}_K"
+        self.begin = "0"  # number of the first block in the island
 
     def law(self, deriv: Deriv) -> Text:
         """df/dx and df/dv: entries [node, axis, of node, x or v, axis]; for a relative pair of the first end alone."""
@@ -583,12 +460,20 @@ class _Family:
     def evaluate(self, deriv: Deriv, text: Text, gap: str) -> list[str]:
         """Statements that evaluate the blocks of all elements, and df/dx gap into the buffer of forces."""
         j, k = self.number, self.nodes
-        stride = "(9 if whole else 6)" if self.relative else str(self.size)
+        stride = "(9 if whole else 6)" if self.relative else "9"
+        own = f"b = np.uintp({stride} * ({self._block(f'(u_ - s{j})')}))"
         body = [f"n{a} = np.uintp(3) * np.uintp(E{j}[{k} * u_ + {a}])" for a in range(k)]
-        body += [*text.lines, f"b = np.uintp({stride} * (u_ - s{j}))", f"c = np.uintp({3 * k} * (u_ - s{j}))"]
+        body += [*text.lines, own, f"c = np.uintp({3 * k} * (u_ - s{j}))"]
         body += self._relative(text) if self.relative else self._full(text)
         lines = [line.replace("GAP", gap) for line in body]
-        return [f"# {self.force.name}", self.switch, f"    for u_ in {deriv.loop}(s{j}, e{j}):", *indented(lines, 2)]
+        loop = f"    for u_ in {deriv.loop}(s{j}, e{j}):"
+        off = [own, f"for q in range({'9 if whole else 6' if self.relative else self.size}):"]
+        off.append(f"    {self.blocks}[b + np.uintp(q)] = R(0)")
+        return [f"# {self.force.name}", self.switch, loop, *indented(lines, 2), "else:", loop, *indented(off, 2)]
+
+    def _block(self, element: str) -> str:
+        """The number of the first block of an element in the island."""
+        return f"{self.begin} + {element if self.relative else f'{self.nodes**2} * {element}'}"
 
     def _relative(self, text: Text) -> list[str]:
         j = self.number
@@ -596,11 +481,13 @@ class _Family:
         lines = [f"d{c} = GAP[n0 + np.uintp({c})] - GAP[n1 + np.uintp({c})]" for c in AXES]
         lines.append("if whole:")
         for i, c in SQUARE:
-            lines.append(f"    K{j}[b + np.uintp({3 * i + c})] = g * ({entry[i, 1, c]}) + gg * ({entry[i, 0, c]})")
+            lines.append(
+                f"    {self.blocks}[b + np.uintp({3 * i + c})] = g * ({entry[i, 1, c]}) + gg * ({entry[i, 0, c]})"
+            )
         lines.append("else:")
         for k, (i, c) in enumerate(UPPER):
             value = _symmetric(entry[i, 0, c], entry[c, 0, i], entry[i, 1, c], entry[c, 1, i])
-            lines.append(f"    K{j}[b + np.uintp({k})] = {value}")
+            lines.append(f"    {self.blocks}[b + np.uintp({k})] = {value}")
         for i in AXES:
             lines.append(f"l{i} = " + " + ".join(f"{entry[i, 0, c]} * d{c}" for c in AXES))
             lines += [f"B{j}[c + np.uintp({i})] = l{i}", f"B{j}[c + np.uintp({3 + i})] = -l{i}"]
@@ -616,7 +503,8 @@ class _Family:
                 for i, c in SQUARE:
                     value = _symmetric(*(e for q in (0, 1) for e in (entry[a, i, b, q, c], entry[b, c, a, q, i])))
                     own = f"g * ({entry[a, i, b, 1, c]}) + gg * ({entry[a, i, b, 0, c]})"
-                    lines.append(f"K{j}[b + np.uintp({9 * (k * a + b) + 3 * i + c})] = {own} if whole else {value}")
+                    at = 9 * (k * a + b) + 3 * i + c
+                    lines.append(f"{self.blocks}[b + np.uintp({at})] = {own} if whole else {value}")
             for i in AXES:
                 terms = " + ".join(
                     f"{entry[a, i, b, 0, c]} * GAP[n{b} + np.uintp({c})]" for b in range(k) for c in AXES
@@ -629,39 +517,6 @@ class _Family:
         j = self.number
         lines = [f"b = np.uintp(3) * np.uintp(I{j}[u_])"]
         lines += [f"f_{a} = f_{a} + B{j}[b + np.uintp({k})]" for k, a in enumerate("xyz")]
-        return self._each(lines)
-
-    def diagonal(self) -> list[str]:
-        """Statements that add the elements' blocks on the diagonal to e00, e01, ..., e22."""
-        j, k = self.number, self.nodes
-        if self.relative:
-            lines = [f"b = np.uintp(6) * np.uintp(I{j}[u_] // 2)"]
-            lines += [f"e{i}{c} = e{i}{c} + K{j}[b + np.uintp({n})]" for n, (i, c) in enumerate(UPPER)]
-        else:
-            lines = [f"b = np.uintp({9 * k} * I{j}[u_] + 9 * (I{j}[u_] % {k}))"]
-            lines += [f"e{i}{c} = e{i}{c} + K{j}[b + np.uintp({3 * i + c})]" for i, c in UPPER]
-        return self._each(lines)
-
-    def product(self, p: str) -> list[str]:
-        """Statements that add the blocks of a row times p to f_x, f_y, f_z."""
-        j, k = self.number, self.nodes
-        if self.relative:
-            lines = [
-                f"c = I{j}[u_]",
-                "b = np.uintp(6) * np.uintp(c >> 1)",
-                f"o = np.uintp(3) * np.uintp(E{j}[2 * s{j} + (c ^ 1)])",
-                *(f"d_{a} = u_{a} - {p}[o + np.uintp({i})]" for i, a in enumerate("xyz")),
-            ]
-            for i, a in enumerate("xyz"):
-                terms = " + ".join(f"K{j}[b + np.uintp({_upper(i, c)})] * d_{d}" for c, d in enumerate("xyz"))
-                lines.append(f"f_{a} = f_{a} + ({terms})")
-            return self._each(lines)
-        lines = [f"c = I{j}[u_]", f"b = np.uintp({9 * k} * c)", f"e = {k} * s{j} + c - c % {k}"]
-        for node in range(k):
-            lines.append(f"o = np.uintp(3) * np.uintp(E{j}[e + {node}])")
-            for i, a in enumerate("xyz"):
-                row = (f"K{j}[b + np.uintp({9 * node + 3 * i + c})] * {p}[o + np.uintp({c})]" for c in AXES)
-                lines.append(f"f_{a} = f_{a} + ({' + '.join(row)})")
         return self._each(lines)
 
     def distance(self) -> list[str]:
@@ -678,16 +533,16 @@ class _Family:
         """Statements that add the blocks of a row to the band."""
         j, k = self.number, self.nodes
         if self.relative:
-            lines = [f"c = I{j}[u_]", "b = np.uintp(9) * np.uintp(c >> 1)"]
+            lines = [f"c = I{j}[u_]", f"b = np.uintp(9 * ({self._block('(c >> 1)')}))"]
             lines.append(f"other = np.int64(E{j}[2 * s{j} + (c ^ 1)])")
             for i, c in SQUARE:
                 for at, sign in ((_place(i, c, "i"), "+"), (_place(i, c, "other"), "-")):
-                    lines.append(f"W[{at}] = W[{at}] {sign} K{j}[b + np.uintp({3 * i + c})]")
+                    lines.append(f"W[{at}] = W[{at}] {sign} {self.blocks}[b + np.uintp({3 * i + c})]")
             return self._each(lines)
-        inner = [f"b = np.uintp({9 * k} * c + 9 * node)", f"other = np.int64(E{j}[e + node])"]
+        inner = [f"b = np.uintp(9 * ({self.begin} + {k} * c + node))", f"other = np.int64(E{j}[e + node])"]
         for i, c in SQUARE:
             at = _place(i, c, "other")
-            inner.append(f"W[{at}] = W[{at}] + K{j}[b + np.uintp({3 * i + c})]")
+            inner.append(f"W[{at}] = W[{at}] + {self.blocks}[b + np.uintp({3 * i + c})]")
         lines = [f"c = I{j}[u_]", f"e = {k} * s{j} + c - c % {k}", f"for node in range({k}):"]
         return self._each([*lines, *indented(inner, 1)])
 
@@ -695,6 +550,25 @@ class _Family:
         """Over the entries of particle g_."""
         j = self.number
         return [self.switch, f"    for u_ in range(J{j}[g_], J{j}[g_ + 1]):", *indented(lines, 2)]
+
+
+def _kind(relative: bool) -> str:
+    return "pair" if relative else "full"
+
+
+def _kinds(families: Sequence[_Family]) -> list[Kind]:
+    """The kinds of blocks that there are; says to each family where its blocks begin."""
+    found = []
+    for relative in (True, False):
+        mine = [k for k, f in enumerate(families) if f.relative == relative]
+        begin: list[str] = []
+        for k in mine:
+            family = families[k]
+            family.begin = " + ".join(begin) or "0"
+            count = f"(e{family.number} - s{family.number})"
+            begin.append(count if relative else f"{family.nodes**2} * {count}")
+        found += [Kind(_kind(relative), relative, tuple(mine))] if mine else []
+    return found
 
 
 def is_relative(force: ElementForce) -> bool:
@@ -734,25 +608,9 @@ def _offsets() -> list[str]:
     return [f"o_{a} = np.uintp(3 * i + {k})" for k, a in enumerate("xyz")]
 
 
-def _upper(i: int, j: int) -> int:
-    """Where entry (i, j) of a symmetric block is kept."""
-    return UPPER.index((min(i, j), max(i, j)))
-
-
 def _symmetric(a: str, a_turned: str, b: str, b_turned: str) -> str:
     """An entry of gamma df/dv + gamma^2 df/dx, made symmetric."""
     return f"R(0.5) * (g * ({b} + {b_turned}) + gg * ({a} + {a_turned}))"
-
-
-def _read(array: str, index: str, name: str) -> list[str]:
-    """The 3x3 matrix of a particle into locals."""
-    return [f"{name}{i}{j} = {array}[np.uintp(9 * {index} + {3 * i + j})]" for i in AXES for j in AXES]
-
-
-def _times(matrix: str, vector: Sequence[str], result: Sequence[str]) -> list[str]:
-    """result = matrix vector, of locals."""
-    lines = [f"new{i} = " + " + ".join(f"{matrix}{i}{j} * {v}" for j, v in enumerate(vector)) for i in AXES]
-    return [*lines, *(f"{r} = new{i}" for i, r in enumerate(result))]
 
 
 def _place(i: int, c: int, other: str) -> str:
@@ -760,20 +618,11 @@ def _place(i: int, c: int, other: str) -> str:
     return f"np.uintp((3 * i + {i}) * wide + 3 * ({other} - i) + m + {c - i})"
 
 
-def _sandwich(name: str, right: str = "s") -> list[str]:
-    """name = s name right, of locals, in the order of `ParticleSystem.jacobian`."""
-    lines = [f"t{i}{j} = " + " + ".join(f"s{i}{k} * {name}{k}{j}" for k in AXES) for i in AXES for j in AXES]
-    return [
-        *lines,
-        *(f"{name}{i}{j} = " + " + ".join(f"t{i}{k} * {right}{k}{j}" for k in AXES) for i in AXES for j in AXES),
-    ]
-
-
 def _projected(matrices: str, vector: str, result: str) -> list[str]:
     """result[i] = matrices[i] vector[i]."""
     return [
-        *_read(matrices, "i", "s"),
-        *_times(
+        *read(matrices, "i", "s"),
+        *times(
             "s", [f"{vector}[np.uintp(3 * i + {k})]" for k in AXES], [f"{result}[np.uintp(3 * i + {k})]" for k in AXES]
         ),
     ]

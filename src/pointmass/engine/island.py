@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pointmass.engine import store
 from pointmass.engine.adaptive import control_text
 from pointmass.engine.binding import Binder
+from pointmass.engine.blocks import Kind, Layout, layout, slices
 from pointmass.engine.forces import Deriv, Incidence, incidence
 from pointmass.engine.impacts import WORK, Impacts
 from pointmass.engine.implicit import implicit_text
@@ -152,7 +153,8 @@ class IslandKernel:
     def call(self) -> str:
         """The arguments of `advance`, as text."""
         more = ["known"] * self.step.keeps + ([] if self.impacts is None else ["events", "paid", "when"])
-        arrays = [*self.work, *self.step.scratch, *self.memory, *more]
+        layouts = [*self.step.arrays, *["slices"] * bool(self.step.kinds)]
+        arrays = [*layouts, *self.work, *self.step.scratch, *self.memory, *more]
         return ", ".join([self.deriv.call, "clock, end, x, v", *arrays, "h_before, control, done"])
 
     @property
@@ -288,6 +290,8 @@ class IslandKernel:
         deriv = self.deriv
         numbers = [f.number for f in deriv.families] + [p.number for p in deriv.pairs]
         ranges = [line for j in numbers for line in (f"s{j} = S{j}[island]", f"e{j} = S{j}[island + 1]")]
+        kinds = self.step.kinds
+        ranges += ["slices = first_slice[island]"] if kinds else []
         lists = [f"K{p.number}[0] = 0" for p in deriv.pairs if p.near]
         lists += ["known[0] = 0"] * (self.step.keeps and bool(lists))
         lists += ["warm_[:] = R(0)"] if "warm" in self.memory else []
@@ -318,7 +322,8 @@ class IslandKernel:
             "reach[island, 0] = far",
             "reach[island, 1] = fast",
         ]
-        data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers)])
+        layouts = [*self.step.arrays, "first_slice"] if kinds else []
+        data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers), *layouts])
         grid = ", ".join([*self.memory, "birth, t0, dt, k0, count, lengths, controls, work, status, reach"])
         given = f"lo, hi, first, x, v, {data}, {grid}"
         made = ", ".join(line.split(" = ")[0] for line in self.scratch)
@@ -366,6 +371,7 @@ class IslandMembers:
         self.order = None if everybody else rows
         self.families = [self._family(f.force) for f in kernel.deriv.families]
         self.pairs = [PairArrays(p, kernel.system.particles, self.place) for p in kernel.deriv.pairs]
+        self.layouts = [self._layout(kind) for kind in kernel.step.kinds]
 
     def _family(self, force: Any) -> tuple[Rows, Incidence]:
         """Elements of a force in the order of the kernel, and where they are."""
@@ -373,6 +379,11 @@ class IslandMembers:
         mine = np.flatnonzero(self.place[nodes[:, 0]] >= 0)
         found = incidence(nodes[mine], self.place, self.first)
         return mine[found.order], found
+
+    def _layout(self, kind: Kind) -> Layout:
+        """Where the blocks of a matrix are."""
+        families = [(self.families[k][1], self.kernel.deriv.families[k].force.nodes) for k in kind.families]
+        return layout(self.first, families, kind.relative)
 
     def run(self, x: Array, v: Array, births: Array | None, span: Span, memory: Memory) -> Outcome:
         """Advance positions and velocities, shape (3 * rows,), in place."""
@@ -389,6 +400,9 @@ class IslandMembers:
             data += pairs.arrays()
             home = np.searchsorted(self.first, pairs.rows[0], side="right") - 1 if len(pairs.rows) else islands
             starts.append(np.where(np.arange(islands + 1) > home, len(pairs.rows), 0))
+        most += [found.most for found in self.layouts]
+        layouts = [array for found in self.layouts for array in found.arrays]
+        layouts += [slices(self.first)] if layouts else []
         begin = np.full(islands, -np.inf) if births is None else np.maximum.reduceat(births, self.first[:-1])
         control, work = np.zeros((islands, len(CONTROL))), np.zeros((islands, 5), np.int64)
         if CONTROL[0] in memory:
@@ -407,6 +421,7 @@ class IslandMembers:
             *data,
             *contact,
             *starts,
+            *layouts,
             *kept,
             begin,
             *grid,

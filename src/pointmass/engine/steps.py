@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from pointmass.engine.blocks import Kind
 from pointmass.engine.printing import literal
 from pointmass.solvers.base import Solver
 from pointmass.solvers.control import control_of
@@ -31,6 +32,7 @@ class StepText:
     scratch : further work arrays -> the expressions that make them; M has the largest numbers of particles and of each
         family's elements of an island.
     memory : arrays of 3 numbers for each particle that the next step reads.
+    kinds : of blocks of the matrix, whose layouts the functions read.
     """
 
     work: list[str]
@@ -41,6 +43,12 @@ class StepText:
     functions: str = ""
     scratch: dict[str, str] = field(default_factory=dict)
     memory: list[str] = field(default_factory=list)
+    kinds: list[Kind] = field(default_factory=list)
+
+    @property
+    def arrays(self) -> list[str]:
+        """Names of the parts of the layouts."""
+        return [array for kind in self.kinds for array in kind.arrays]
 
 
 def step_text(

@@ -21,8 +21,8 @@ class Implicit(Solver):
     ----------
     linear_solver : "cg" for conjugate gradients, which leave what is not symmetric (some damping) to Newton's method;
         "direct" for factors of the matrix, "auto" for what is faster. The reference path takes LU factors, compiled
-        steps eliminate chains and take conjugate gradients for larger islands: both agree to the tolerances. Single
-        particles and systems of order 1 are always solved directly.
+        steps eliminate chains; of larger islands, "auto" takes conjugate gradients, which agree to the tolerances, and
+        "direct" the reference path. Single particles and systems of order 1 are always solved directly.
     newton : "full" until the equation is solved, "one" for a single linearised step (Baraff and Witkin 1998).
     tolerance : residual of the equation, relative to the size of its terms.
     max_iterations : linear systems for one step.
