@@ -11,7 +11,7 @@ import numba
 import pytest
 
 from pointmass.cli.compiling import compiling_said
-from pointmass.cli.options import use_threads
+from pointmass.engine.threads import use_threads
 
 LINE = "pointmass: compiling the renderer (once per machine, about 20 s)...\n"
 

@@ -60,6 +60,20 @@ def test_one_two_three_and_seven_threads_give_the_same_bits() -> None:
     assert len({digest(threads) for threads in (1, 2, 3, 7)}) == 1
 
 
+@pytest.mark.parametrize(("asked", "answer"), [("1", "1"), ("none", "POINTMASS_THREADS = none is not allowed")])
+def test_the_environment_says_how_many_threads_there_are(asked: str, answer: str) -> None:
+    program = """
+import pointmass as pm
+sim = pm.Simulation(pm.ParticleSystem(pm.Particles((0, 1, 0)), pm.Gravity()), "leapfrog", 0.01, compiled=True)
+sim.step()
+import numba
+print(numba.get_num_threads())
+"""
+    environment = {**os.environ, "POINTMASS_THREADS": asked}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
+    assert answer in done.stdout + done.stderr
+
+
 def test_every_item_is_worked_on_once() -> None:
     for count, grain in ((0, 1), (1, 1), (7, 2), (1000, 1), (1000, 300)):
         seen = [0] * count

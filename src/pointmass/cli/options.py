@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import sys
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from pointmass.engine.threads import use_threads
 from pointmass.errors import InvalidInput, number, unknown, whole_number
 
 if TYPE_CHECKING:
@@ -75,19 +74,6 @@ def run_options(command: Command) -> Command:
     return command
 
 
-def use_threads(threads: int | None) -> None:
-    """Let Numba run on so many threads; once it is imported, there cannot be more than it has."""
-    if threads is None:
-        return
-    threads = whole_number("threads", threads, at_least=1)
-    if "numba" not in sys.modules:
-        os.environ["NUMBA_NUM_THREADS"] = str(threads)
-        return
-    import numba
-
-    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
-
-
 def load_scene(source: str, options: RunOptions) -> Scene:
     """The scene that a command line names, with its options.
 
@@ -96,7 +82,8 @@ def load_scene(source: str, options: RunOptions) -> Scene:
     InvalidInput
         No such scene, a file that is no scene, an option that is not allowed.
     """
-    use_threads(options.threads)
+    if options.threads is not None:
+        use_threads(options.threads)
     if options.dt is not None and options.substeps is not None:
         raise InvalidInput("--dt and --substeps both set the step: give one of them")
     return _with_options(_described(source, _settings(options.settings)), options)

@@ -20,11 +20,11 @@ from pointmass.cli.options import (
     parse_size,
     quiet,
     run_options,
-    use_threads,
 )
 from pointmass.cli.progress import progress
 from pointmass.cli.report import Report, counted
 from pointmass.cli.run import simulate
+from pointmass.engine.threads import use_threads
 from pointmass.errors import Diverged, InvalidInput, number
 
 if TYPE_CHECKING:
@@ -145,7 +145,8 @@ def _from_cache(source: str, options: RunOptions, drawing: Drawing, report: Repo
 
     if options.given():
         raise InvalidInput(f"{options.given()[0]} cannot change the cache {source!r}: render the scene instead")
-    use_threads(options.threads)
+    if options.threads is not None:
+        use_threads(options.threads)
     cache = Cache.open(source)
     if not len(cache):
         raise InvalidInput(f"the cache {source!r} has no frames: run the scene again")

@@ -21,6 +21,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from pointmass.engine.threads import heed_environment
+
 HEADER = '''"""{title}
 
 Printed by pointmass {version} for {dtype}. It runs without Numba too: delete the lines `@njit`.
@@ -70,6 +72,7 @@ def load(title: str, text: str, dtype: str) -> ModuleType:
         and OWNING, OWNING_ENTRY for those that make arrays.
     dtype : "float64" or "float32".
     """
+    heed_environment()
     source = complete(title, text, dtype)
     key = sha256((source + _surroundings()).encode()).hexdigest()[:20]
     with LOCK:

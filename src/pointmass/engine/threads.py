@@ -7,10 +7,13 @@ takes twice as long to compile. What a thread gets has no influence on the resul
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
+
+from pointmass.errors import InvalidInput, whole_number
 
 PIECES = 8  # for each thread, so that one who is late does not keep all waiting
 
@@ -27,6 +30,44 @@ def spread(work: Callable[[int, int], object], count: int, grain: int) -> None:
     ends = [count * k // pieces for k in range(pieces + 1)]
     for done in [_pool(os.getpid(), threads).submit(work, a, b) for a, b in pairwise(ends)]:
         done.result()
+
+
+def use_threads(threads: int) -> None:
+    """Let kernels run on so many threads, whatever the environment asks for.
+
+    Raises
+    ------
+    InvalidInput
+        Not a whole number of at least 1.
+    """
+    heed_environment()
+    _use(whole_number("threads", threads, at_least=1))
+
+
+@cache
+def heed_environment() -> None:
+    """As many threads as POINTMASS_THREADS says, from the first kernel on.
+
+    Raises
+    ------
+    InvalidInput
+        It is not a whole number of at least 1.
+    """
+    given = os.environ.get("POINTMASS_THREADS", "")
+    if given and not (given.isdigit() and int(given) > 0):
+        raise InvalidInput(f"POINTMASS_THREADS = {given} is not allowed: it must be a whole number, at least 1")
+    if given:
+        _use(int(given))
+
+
+def _use(threads: int) -> None:
+    if "numba" not in sys.modules:
+        os.environ["NUMBA_NUM_THREADS"] = str(threads)
+        return
+    import numba
+
+    # Once Numba is imported, there cannot be more than it has.
+    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
 
 
 @cache
