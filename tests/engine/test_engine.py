@@ -302,3 +302,42 @@ def test_lanes_of_single_particles_are_vectors() -> None:
     for name in ("lanes4", "lanes1", "load", "keep"):
         text = "".join(scope[name].inspect_asm().values())
         assert text.count("%ymm") + text.count("%zmm") > 50, name
+
+
+def test_a_failed_span_leaves_what_the_solver_remembers() -> None:
+    """Also if particles were born in it: the memory is for those that are there, not for those that were not kept."""
+    p = pm.Particles([[0, 0, 0]])
+    blast = pm.Field(("exp(900*t)*1e300", "0", "0"), enabled=False)
+    nozzle = pm.Nozzle(rate=70, lifetime=0.2, position=(0, 3, 0))
+    system = pm.ParticleSystem(p, [pm.Gravity(), blast])
+    sim = pm.Simulation(system, "bdf2", 1 / 60, emitters=[nozzle], compiled=True)
+    sim.step(60)
+    blast.enabled = True
+    with pytest.raises(pm.Diverged):
+        sim.step()
+    blast.enabled = False
+    sim.step(60)
+    assert sim.t == 2.0
+
+
+def test_the_last_of_several_steps_can_be_looked_into_afterwards() -> None:
+    def made() -> pm.Simulation:
+        rng = np.random.default_rng(3)
+        p = pm.Particles(rng.uniform(0.1, 1, (30, 3)))
+        system = pm.ParticleSystem(p, [pm.Gravity(), pm.Springs([(0, 1)], 10.0)], [pm.Plane(restitution=0.5)])
+        return pm.Simulation(system, "rk4", 0.05, compiled=True)
+
+    sim, other = made(), made()
+    sim.step(7)
+    looks = [sim.frame(t=t).positions for t in (0.31, 0.34)]
+    sim.step(3)
+    other.step(6)
+    other._advance(1, look_inside=True)
+    np.testing.assert_array_equal([other.frame(t=t).positions for t in (0.31, 0.34)], looks)
+    other.step(3)
+    np.testing.assert_array_equal(sim.system.particles.x, other.system.particles.x)
+    sim.step()
+    sim.system.particles.x[3] += 1.0
+    with pytest.raises(pm.InvalidInput, match="after which something was changed"):
+        sim.frame(t=0.53)
+    assert sim.frame().positions[3, 0] == sim.system.particles.x[3, 0]

@@ -88,7 +88,7 @@ class ReferenceEngine:
         """
         system = self.system
         self._pieces = []
-        self._fit_memory()
+        self.memory = self._fitted_memory()
         self._ids, self._islands = system.particles.id, system.island_of_particle
         self._events = np.zeros(len(self._ids), np.intp)
         self._ground = np.zeros((len(self._ids), 3))  # velocity of the surface that each hit last
@@ -114,8 +114,7 @@ class ReferenceEngine:
 
     def recall(self) -> Memory:
         """A copy of what the solver remembers, for the particles as they are now."""
-        self._fit_memory()
-        memory = {**self.solver.start(self.system), **self.memory}
+        memory = {**self.solver.start(self.system), **self._fitted_memory()}
         return {name: values.copy() for name, values in memory.items()}
 
     def remember(self, memory: Memory, work: Stats) -> None:
@@ -124,6 +123,14 @@ class ReferenceEngine:
         self._ids, self._islands = self.system.particles.id, self.system.island_of_particle
         if memory:
             self._left = self._touchable()
+
+    def left(self) -> Any:
+        """What is known between two steps, to `leave` it again."""
+        return self.memory, self.stats, self._ids, self._islands, self._left
+
+    def leave(self, left: Any) -> None:
+        """Know again what was known then."""
+        self.memory, self.stats, self._ids, self._islands, self._left = left
 
     def state_at(self, t: float) -> Array:
         """State of the present particles at a time within the last step, shape (dim,); nothing is changed.
@@ -159,18 +166,18 @@ class ReferenceEngine:
         pins = np.broadcast_to(p.pinned[:, None], p.x.shape)
         return np.concatenate([_by_particle(self.system.get_state(), self.system.order), pins[None]])
 
-    def _fit_memory(self) -> None:
-        """Carry what the solver remembers over births, deaths and new links: each particle keeps its own.
+    def _fitted_memory(self) -> Memory:
+        """What the solver remembers, carried over births, deaths and new links: each particle keeps its own.
 
         An island in which somebody was moved, pushed or pinned from outside starts anew.
         """
         if not self.memory:
-            return
+            return {}
         system = self.system
         ids, islands = system.particles.id, system.island_of_particle
         now_is = self._touchable()
         if self._ids is ids and self._islands is islands and np.array_equal(now_is, self._left):
-            return
+            return self.memory
         then, now = _match(self._ids, ids)
         touched = islands[now[(now_is[:, now] != self._left[:, then]).any(axis=(0, 2))]]
         kept = ~np.isin(islands[now], touched)
@@ -182,7 +189,7 @@ class ReferenceEngine:
                 _by_particle(new, system.order)[:, now] = _by_particle(old, system.order)[:, then]
             else:
                 new[islands[now]] = old[self._islands[then]]
-        self.memory = fresh
+        return fresh
 
     # ------------------------------------------------------------------------------------------------ hooks
 
