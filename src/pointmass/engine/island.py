@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pointmass.engine import store
 from pointmass.engine.adaptive import control_text
 from pointmass.engine.binding import Binder
-from pointmass.engine.forces import Deriv, Incidence, incidence
+from pointmass.engine.forces import LANES, Deriv, Incidence, incidence
 from pointmass.engine.impacts import WORK, Impacts
 from pointmass.engine.implicit import implicit_text
 from pointmass.engine.pairs import FULL, PairArrays
@@ -135,7 +135,7 @@ class IslandKernel:
     def work(self) -> list[str]:
         """Arrays that an island needs while it is advanced, each of length 3n."""
         more = [] if self.impacts is None else [*WORK, "av"]
-        return [*self.step.work, "x1", "v1", *more]
+        return [*self.step.work, *([] if self.step.in_place else ["x1", "v1"]), *more]
 
     @property
     def memory(self) -> list[str]:
@@ -154,7 +154,8 @@ class IslandKernel:
         """Statements that make what an island needs; M has the largest counts of particles and of elements."""
         contact = self.deriv.contact
         families = enumerate(self.deriv.families)
-        lines = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{k + 1}], R)" for k, f in families]
+        lines = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{k + 1}], R)" for k, f in families if f.implicit]
+        lines += [f"{name} = {make}" for name, make in self.deriv.scratch.items()]
         lines += [f"{name} = np.empty(3 * M[0], R)" for name in self.work]
         lines += ["known = np.zeros(1, np.int64)"] * self.step.keeps
         lines += [f"{name} = {make}" for name, make in self.step.scratch.items()]
@@ -248,7 +249,7 @@ class IslandKernel:
             f"    done[1] += {step.evaluations}",
             *indented(judged, 1),
             *indented(after, 1),
-            *indented(each(deriv.loop, keep), 1),
+            *indented([] if step.in_place else each(deriv.loop, keep), 1),
             *indented(beyond, 1),
             "return status",
         ]
@@ -279,8 +280,14 @@ class IslandKernel:
     def _run(self) -> str:
         """The kernel itself: the islands of a group over a span."""
         deriv = self.deriv
-        numbers = [f.number for f in deriv.families] + [p.number for p in deriv.pairs]
-        ranges = [line for j in numbers for line in (f"s{j} = S{j}[island]", f"e{j} = S{j}[island + 1]")]
+        elements, pairs = [f.number for f in deriv.families], [p.number for p in deriv.pairs]
+        numbers = elements + pairs
+        ranges = [line for j in pairs for line in (f"s{j} = S{j}[island]", f"e{j} = S{j}[island + 1]")]
+        ranges += [f"T{j} = S{j}" if deriv.parallel else f"T{j} = S{j}[island:island + 2]" for j in elements]
+        if deriv.implicit:
+            ranges += [line for j in elements for line in (f"s{j} = T{j}[0]", f"e{j} = T{j}[-1]")]
+        if elements:
+            ranges.append("cuts = tiling" if deriv.parallel else "cuts = tiling[island:island + 2]")
         lists = [f"K{p.number}[0] = 0" for p in deriv.pairs if p.near]
         lists += ["known[0] = 0"] * (self.step.keeps and bool(lists))
         lists += ["warm_[:] = R(0)"] if "warm" in self.memory else []
@@ -311,9 +318,10 @@ class IslandKernel:
             "reach[island, 0] = far",
             "reach[island, 1] = fast",
         ]
-        data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers)])
+        data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers), *["tiling"] * bool(elements)])
         grid = ", ".join([*self.memory, "birth, t0, dt, k0, count, lengths, controls, work, status, reach"])
-        loop = [*self.scratch, "for island in range(lo, hi):", *indented(island, 1)]
+        made = [f"tiles = {'len(tiling) - 1' if deriv.parallel else 1}"] * bool(elements)
+        loop = [*made, *self.scratch, "for island in range(lo, hi):", *indented(island, 1)]
         head = ["@njit(**ENTRY)", f"def run(lo, hi, first, x, v, {data}, M, {grid}):"]
         return "\n".join([*head, *indented(loop, 1), ""])
 
@@ -350,15 +358,34 @@ class IslandMembers:
         self.place[rows] = np.arange(len(rows))
         everybody = len(rows) == len(self.place) and bool((np.diff(rows) == 1).all())
         self.order = None if everybody else rows
-        self.families = [self._family(f.force) for f in kernel.deriv.families]
+        elements = [self._elements(f.force) for f in kernel.deriv.families]
+        self.tiling = self._tiles([nodes for _, nodes in elements]) if kernel.deriv.parallel else self.first
+        self.families = []
+        for mine, nodes in elements:
+            found = incidence(nodes, self.place, self.tiling, kernel.deriv.parallel)
+            self.families.append((mine[found.order], found))
         self.pairs = [PairArrays(p, kernel.system.particles, self.place) for p in kernel.deriv.pairs]
 
-    def _family(self, force: Any) -> tuple[Rows, Incidence]:
-        """Elements of a force in the order of the kernel, and where they are."""
+    def _elements(self, force: Any) -> tuple[Rows, Rows]:
+        """Numbers and particles of the elements of a force that are in the group."""
         nodes = force.rows(self.kernel.system.particles)
         mine = np.flatnonzero(self.place[nodes[:, 0]] >= 0)
-        found = incidence(nodes[mine], self.place, self.first)
-        return mine[found.order], found
+        return mine, nodes[mine]
+
+    def _tiles(self, families: list[Rows]) -> NDArray[np.int64]:
+        """First rows of the tiles of an island, one for each thread, so that all have as much to do.
+
+        They are multiples of `LANES`, so that the same particles are left over at the end of loops of vectors.
+        """
+        import numba
+
+        work = np.ones(len(self.rows))
+        for nodes in families:
+            work += np.bincount(self.place[nodes].ravel(), minlength=len(work))
+        done = np.cumsum(work)
+        tiles = numba.get_num_threads()
+        inner = np.searchsorted(done, done[-1] * np.arange(1, tiles) / tiles)
+        return np.unique(np.concatenate([[0], inner // LANES * LANES, [len(work)]])).astype(np.int64)
 
     def run(self, x: Array, v: Array, births: Array | None, span: Span, memory: Memory) -> Outcome:
         """Advance positions and velocities, shape (3 * rows,), in place."""
@@ -368,9 +395,11 @@ class IslandMembers:
         contact = [] if deriv.contact is None else [deriv.contact.table()]
         starts, most = [], [int(np.diff(self.first).max(initial=0))]
         for family, (elements, found) in zip(deriv.families, self.families, strict=True):
-            data += [found.nodes, family.table.array(len(elements), dtype, elements), found.ends, found.entries]
+            more = np.append(elements, np.repeat(elements[-1:], LANES - 1))  # a law is evaluated for so many at once
+            data += [found.nodes, family.table.array(len(more), dtype, more)]
+            data += [found.ends, found.entries] * family.implicit
             starts.append(found.start)
-            most.append(int(np.diff(found.start).max(initial=0)))
+            most.append(len(elements) if deriv.parallel else int(np.diff(found.start).max(initial=0)))
         for pairs in self.pairs:
             data += pairs.arrays()
             home = np.searchsorted(self.first, pairs.rows[0], side="right") - 1 if len(pairs.rows) else islands
@@ -393,6 +422,7 @@ class IslandMembers:
             *data,
             *contact,
             *starts,
+            *[self.tiling] * bool(self.families),
             np.array(most),
             *kept,
             begin,
