@@ -47,26 +47,27 @@ class Elements:
 
     Attributes
     ----------
-    number : of the family; the arrays of the kernel are named after it: E (nodes), D (columns), T (range of each tile);
-        for implicit solvers also J and I (incidence), B (buffer of forces), and s, e (its range in the island).
+    number : of the family; the arrays of the kernel are named after it: N (nodes), L (columns) and T (ranges), tile by
+        tile; for the blocks of implicit solvers also E (nodes) and D (columns), element by element, J and I
+        (incidence), B (buffer of forces), and s, e (its range in the island).
+    tiled, table : columns tile by tile, and element by element.
     """
 
     force: ElementForce
     number: int
+    tiled: Table
     table: Table
     implicit: bool
 
     @property
     def arguments(self) -> list[str]:
         """Arrays of the kernel."""
-        j = self.number
-        return [f"E{j}", f"D{j}", *[f"J{j}", f"I{j}"] * self.implicit]
+        return [f"{name}{self.number}" for name in ("NLEDJI" if self.implicit else "NL")]
 
     @property
     def locals(self) -> list[str]:
         """What a call for one island takes besides: buffer and ranges."""
-        j = self.number
-        return [f"T{j}", *[f"B{j}", f"s{j}", f"e{j}"] * self.implicit]
+        return [f"{name}{self.number}" for name in ("TBse" if self.implicit else "T")]
 
 
 class Deriv:
@@ -123,8 +124,10 @@ class Deriv:
 
     @property
     def scratch(self) -> dict[str, str]:
-        """What elements need besides -> how it is made, for `tiles` tiles at once; M[0] is the largest number of particles
-        of an island."""
+        """What elements need besides -> how it is made, for `tiles` tiles at once.
+
+        M[0] is the largest number of particles of an island.
+        """
         if not self.families:
             return {}
         nodes = max(f.force.nodes for f in self.families)
@@ -168,7 +171,9 @@ class Deriv:
                 *(f"    records[{RECORD} * i + {c}] = {q}[3 * i + {c % 3}]" for c, q in enumerate("xxxvvv")),
             ]
             if self.parallel:
-                parts.append(_function("tile_of", f"tile, {self.call}, t, x, v, k", "**FLAGS", [*numbers, "status = 0", *tile]))
+                parts.append(
+                    _function("tile_of", f"tile, {self.call}, t, x, v, k", "**FLAGS", [*numbers, "status = 0", *tile])
+                )
                 body += [
                     "worst = 0",
                     "for tile in prange(len(cuts) - 1):",
@@ -227,8 +232,8 @@ class Deriv:
     def _elements(self, force: ElementForce, tag: str) -> list[str]:
         """Statements that go through the elements of a tile and add what they do to its particles."""
         j, nodes = len(self.families) + len(self.pairs), force.nodes
-        table = Table(f"D{j}")
-        self.families.append(Elements(force, j, table, self.implicit))
+        table = Table(f"L{j}")
+        self.families.append(Elements(force, j, table, Table(f"D{j}"), self.implicit))
         state = {"t": "R(t)"}
         for node in range(nodes):
             for k, q in enumerate("xv"):
@@ -252,34 +257,37 @@ class Deriv:
                 for c, value in enumerate([*values[3 * node : 3 * node + 3], zero]):
                     write.append(f"z[b + np.uintp({TOTAL * LANES * place + c})] = {value}")
             add += [
-                f"row = np.uintp(E{j}[e + np.uintp({node})])",
+                f"row = np.uintp(N{j}[e + np.uintp({node})])",
                 "row = row if row - begin < own else spare",
                 f"{way}(totals, np.uintp({TOTAL}) * row, z, b + np.uintp({TOTAL * LANES * place}))",
             ]
         # Vectors round another way than single numbers: which elements are left over must not depend on the tiles.
         lanes = str(LANES) if self.parallel else "count"
-        place = ["i = np.uintp(lane)", f"e = np.uintp({nodes}) * (np.uintp(first) + i)"]
+        item = ["i = np.uintp(lane)", f"e = np.uintp({nodes}) * (np.uintp(first) + i)"]
+        turn = [
+            f"columns(s, i + np.uintp({6 * LANES * node}), {LANES}, records, N{j}, e + np.uintp({node}), {nodes})"
+            for node in range(nodes)
+        ]
         return [
             f"# {force.name}",
             f"if {self.binder.switch(force)} != 0:",
             f"    for first in range(T{j}[tile], T{j}[tile + 1], {LANES}):",
             f"        count = min({LANES}, T{j}[tile + 1] - first)",
-            f"        for lane in range(0, count - 7, 8):",
-            *indented(place, 3),
-            *(f"            columns(s, i + np.uintp({6 * LANES * node}), {LANES}, records, E{j}, e + np.uintp({node}), {nodes})" for node in range(nodes)),
-            f"        for lane in range(count - count % 8, count):",
-            *indented(place, 3),
+            "        for lane in range(0, count - 7, 8):",
+            *indented([*item, *turn], 3),
+            "        for lane in range(count - count % 8, count):",
+            *indented(item, 3),
             f"            for node in range({nodes}):",
-            f"                row = np.uintp({RECORD}) * np.uintp(E{j}[e + np.uintp(node)])",
-            f"                for c in range(6):",
+            f"                row = np.uintp({RECORD}) * np.uintp(N{j}[e + np.uintp(node)])",
+            "                for c in range(6):",
             f"                    s[i + np.uintp({6 * LANES} * node + {LANES} * c)] = records[row + np.uintp(c)]",
             f"        for lane in range({lanes}):",
             "            i = np.uintp(lane)",
             "            u = np.uintp(first) + i",
             f"            b = np.uintp({TOTAL}) * i",
             *indented([*text.lines, *write], 3),
-            f"        for lane in range(count):",
-            *indented([*place, f"b = np.uintp({TOTAL}) * i", *add], 3),
+            "        for lane in range(count):",
+            *indented([*item, f"b = np.uintp({TOTAL}) * i", *add], 3),
         ]
 
 
@@ -346,12 +354,11 @@ class Incidence:
 
     Attributes
     ----------
-    order : of the elements: part by part, and within one by their number, shape (e,). One that belongs to several parts
-        is there for each.
+    order : of the elements: island by island, and within one by their number, shape (e,).
     nodes : row of each node within its island, shape (e * k,).
-    start : first element of each part, shape (parts + 1,).
+    start : first element of each island, shape (islands + 1,).
     ends : start of each row's entries in `entries`, shape (rows + 1,).
-    entries : element within its island times k plus node, for each row by element.
+    entries : element within its island times k plus node, for each row by element, shape (e * k,).
     """
 
     order: NDArray[np.intp]
@@ -361,34 +368,61 @@ class Incidence:
     entries: NDArray[np.int32]
 
 
-def incidence(
-    rows: NDArray[np.intp], place: NDArray[np.intp], first: NDArray[np.int64], tiles: bool = False
-) -> Incidence:
+def incidence(rows: NDArray[np.intp], place: NDArray[np.intp], first: NDArray[np.int64]) -> Incidence:
     """Sort the elements of a group of islands.
 
     Parameters
     ----------
     rows : particles of each element, shape (e, k), all of the group.
     place : row in the kernel of each particle of the system, shape (n,).
-    first : first row of each part, shape (parts + 1,).
-    tiles : whether the parts are tiles of one island, instead of islands.
+    first : first row of each island, shape (islands + 1,).
     """
     places = place[rows]
-    part = np.searchsorted(first, places, side="right") - 1
-    anew = np.ones(part.shape, bool)
-    for node in range(1, part.shape[1]):
-        anew[:, node] = (part[:, :node] != part[:, node : node + 1]).all(axis=1)
-    element, node = np.nonzero(anew)
-    part = part[element, node]
-    by_part = np.argsort(part, kind="stable")
-    order, part = element[by_part], part[by_part]
-    places = places[order]
-    start = np.searchsorted(part, np.arange(len(first)), side="left").astype(np.int64)
+    island = np.searchsorted(first, places[:, 0], side="right") - 1
+    order = np.argsort(island, kind="stable")
+    places, island = places[order], island[order]
+    start = np.searchsorted(island, np.arange(len(first)), side="left").astype(np.int64)
     k = rows.shape[1]
-    begin = 0 if tiles else start[part]
-    own = (np.arange(len(order)) - begin)[:, None] * k + np.arange(k)
-    mine = (places >= first[part][:, None]) & (places < first[part + 1][:, None])
-    by_row = np.argsort(places[mine], kind="stable")
-    ends = np.searchsorted(places[mine][by_row], np.arange(first[-1] + 1), side="left").astype(np.int64)
-    local = places - (first[0] if tiles else first[part][:, None])
-    return Incidence(order, local.astype(np.int32).ravel(), start, ends, own[mine][by_row].astype(np.int32))
+    own = (np.arange(len(rows)) - start[island])[:, None] * k + np.arange(k)
+    by_row = np.argsort(places.ravel(), kind="stable")
+    ends = np.searchsorted(places.ravel()[by_row], np.arange(first[-1] + 1), side="left").astype(np.int64)
+    local = places - first[island][:, None]
+    return Incidence(order, local.astype(np.int32).ravel(), start, ends, own.ravel()[by_row].astype(np.int32))
+
+
+@dataclass(frozen=True, eq=False)
+class Tiled:
+    """The elements of a family tile by tile; one between several tiles is there for each.
+
+    Attributes
+    ----------
+    order : of the elements: tile by tile, and within one by their number, shape (e,).
+    nodes : row of each node within its island, shape (e * k,).
+    start : first element of each tile, shape (tiles + 1,).
+    """
+
+    order: NDArray[np.intp]
+    nodes: NDArray[np.int32]
+    start: NDArray[np.int64]
+
+
+def tiled(places: NDArray[np.intp], cuts: NDArray[np.int64], first: NDArray[np.int64]) -> Tiled:
+    """Sort elements into tiles.
+
+    Parameters
+    ----------
+    places : rows of each element, shape (e, k).
+    cuts : first row of each tile, shape (tiles + 1,).
+    first : first row of the island of each tile, shape (tiles,).
+    """
+    tile = np.searchsorted(cuts, places, side="right") - 1
+    anew = np.ones(tile.shape, bool)
+    for node in range(1, tile.shape[1]):
+        anew[:, node] = (tile[:, :node] != tile[:, node : node + 1]).all(axis=1)
+    element, which = np.nonzero(anew)
+    tile = tile[element, which]
+    by_tile = np.argsort(tile, kind="stable")
+    order, tile = element[by_tile], tile[by_tile]
+    start = np.searchsorted(tile, np.arange(len(cuts)), side="left").astype(np.int64)
+    local = places[order] - first[tile][:, None]
+    return Tiled(order, local.astype(np.int32).ravel(), start)

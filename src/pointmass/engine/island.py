@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pointmass.engine import store
 from pointmass.engine.adaptive import control_text
 from pointmass.engine.binding import Binder
-from pointmass.engine.forces import LANES, Deriv, Incidence, incidence
+from pointmass.engine.forces import LANES, Deriv, Incidence, incidence, tiled
 from pointmass.engine.impacts import WORK, Impacts
 from pointmass.engine.implicit import implicit_text
 from pointmass.engine.pairs import FULL, PairArrays
@@ -280,14 +280,11 @@ class IslandKernel:
     def _run(self) -> str:
         """The kernel itself: the islands of a group over a span."""
         deriv = self.deriv
-        elements, pairs = [f.number for f in deriv.families], [p.number for p in deriv.pairs]
-        numbers = elements + pairs
-        ranges = [line for j in pairs for line in (f"s{j} = S{j}[island]", f"e{j} = S{j}[island + 1]")]
-        ranges += [f"T{j} = S{j}" if deriv.parallel else f"T{j} = S{j}[island:island + 2]" for j in elements]
-        if deriv.implicit:
-            ranges += [line for j in elements for line in (f"s{j} = T{j}[0]", f"e{j} = T{j}[-1]")]
-        if elements:
-            ranges.append("cuts = tiling" if deriv.parallel else "cuts = tiling[island:island + 2]")
+        elements = [f.number for f in deriv.families]
+        numbers = elements * deriv.implicit + [p.number for p in deriv.pairs]
+        ranges = [line for j in numbers for line in (f"s{j} = S{j}[island]", f"e{j} = S{j}[island + 1]")]
+        tiles = {f"T{j}": f"tiles{j}" for j in elements} | ({"cuts": "tiling"} if elements else {})
+        ranges += [f"{name} = {all_}" + "[island:island + 2]" * (not deriv.parallel) for name, all_ in tiles.items()]
         lists = [f"K{p.number}[0] = 0" for p in deriv.pairs if p.near]
         lists += ["known[0] = 0"] * (self.step.keeps and bool(lists))
         lists += ["warm_[:] = R(0)"] if "warm" in self.memory else []
@@ -318,7 +315,7 @@ class IslandKernel:
             "reach[island, 0] = far",
             "reach[island, 1] = fast",
         ]
-        data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers), *["tiling"] * bool(elements)])
+        data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers), *tiles.values()])
         grid = ", ".join([*self.memory, "birth, t0, dt, k0, count, lengths, controls, work, status, reach"])
         made = [f"tiles = {'len(tiling) - 1' if deriv.parallel else 1}"] * bool(elements)
         loop = [*made, *self.scratch, "for island in range(lo, hi):", *indented(island, 1)]
@@ -358,13 +355,18 @@ class IslandMembers:
         self.place[rows] = np.arange(len(rows))
         everybody = len(rows) == len(self.place) and bool((np.diff(rows) == 1).all())
         self.order = None if everybody else rows
-        elements = [self._elements(f.force) for f in kernel.deriv.families]
-        self.tiling = self._tiles([nodes for _, nodes in elements]) if kernel.deriv.parallel else self.first
-        self.families = []
-        for mine, nodes in elements:
-            found = incidence(nodes, self.place, self.tiling, kernel.deriv.parallel)
-            self.families.append((mine[found.order], found))
         self.pairs = [PairArrays(p, kernel.system.particles, self.place) for p in kernel.deriv.pairs]
+        elements = [self._elements(f.force) for f in kernel.deriv.families]
+        self.families = [self._family(*each) for each in elements] if kernel.deriv.implicit else []
+        places = [self.place[nodes] for _, nodes in elements]
+        self.tiling = self._tiling(places) if kernel.deriv.parallel else self.first
+        first = 0 * self.tiling[:-1] if kernel.deriv.parallel else self.first[:-1]
+        self.tiles = [tiled(rows, self.tiling, first) for rows in places]
+        # A law is evaluated for so many elements at once, also for the last ones.
+        self.tiled = [
+            np.append(mine[t.order], np.repeat(mine[t.order[-1:]], LANES - 1))
+            for (mine, _), t in zip(elements, self.tiles, strict=True)
+        ]
 
     def _elements(self, force: Any) -> tuple[Rows, Rows]:
         """Numbers and particles of the elements of a force that are in the group."""
@@ -372,7 +374,12 @@ class IslandMembers:
         mine = np.flatnonzero(self.place[nodes[:, 0]] >= 0)
         return mine, nodes[mine]
 
-    def _tiles(self, families: list[Rows]) -> NDArray[np.int64]:
+    def _family(self, mine: Rows, nodes: Rows) -> tuple[Rows, Incidence]:
+        """Elements in the order of the kernel, and where they are."""
+        found = incidence(nodes, self.place, self.first)
+        return mine[found.order], found
+
+    def _tiling(self, places: list[Rows]) -> NDArray[np.int64]:
         """First rows of the tiles of an island, one for each thread, so that all have as much to do.
 
         They are multiples of `LANES`, so that the same particles are left over at the end of loops of vectors.
@@ -380,8 +387,8 @@ class IslandMembers:
         import numba
 
         work = np.ones(len(self.rows))
-        for nodes in families:
-            work += np.bincount(self.place[nodes].ravel(), minlength=len(work))
+        for rows in places:
+            work += np.bincount(rows.ravel(), minlength=len(work))
         done = np.cumsum(work)
         tiles = numba.get_num_threads()
         inner = np.searchsorted(done, done[-1] * np.arange(1, tiles) / tiles)
@@ -394,12 +401,13 @@ class IslandMembers:
         data = deriv.binder.data(count, self.order)
         contact = [] if deriv.contact is None else [deriv.contact.table()]
         starts, most = [], [int(np.diff(self.first).max(initial=0))]
-        for family, (elements, found) in zip(deriv.families, self.families, strict=True):
-            more = np.append(elements, np.repeat(elements[-1:], LANES - 1))  # a law is evaluated for so many at once
-            data += [found.nodes, family.table.array(len(more), dtype, more)]
-            data += [found.ends, found.entries] * family.implicit
-            starts.append(found.start)
-            most.append(len(elements) if deriv.parallel else int(np.diff(found.start).max(initial=0)))
+        for k, family in enumerate(deriv.families):
+            data += [self.tiles[k].nodes, family.tiled.array(len(self.tiled[k]), dtype, self.tiled[k])]
+            if deriv.implicit:
+                elements, found = self.families[k]
+                data += [found.nodes, family.table.array(len(elements), dtype, elements), found.ends, found.entries]
+                starts.append(found.start)
+                most.append(int(np.diff(found.start).max(initial=0)))
         for pairs in self.pairs:
             data += pairs.arrays()
             home = np.searchsorted(self.first, pairs.rows[0], side="right") - 1 if len(pairs.rows) else islands
@@ -422,7 +430,8 @@ class IslandMembers:
             *data,
             *contact,
             *starts,
-            *[self.tiling] * bool(self.families),
+            *(t.start for t in self.tiles),
+            *[self.tiling] * bool(self.tiles),
             np.array(most),
             *kept,
             begin,

@@ -113,9 +113,7 @@ def _splitting(
     passes = solver.passes if velocity_dependent else 1
     evaluations, fresh = 1, True
     x1, v1 = ("x1", "v1") if contacts else ("x", "v")
-    for k, ((opening, drift, closing), (before, after)) in enumerate(
-        zip(solver.substeps, solver._times, strict=True)
-    ):
+    for k, ((opening, drift, closing), (before, after)) in enumerate(zip(solver.substeps, solver._times, strict=True)):
         x, v = ("x", "v") if k == 0 else (x1, v1)
         rest = [AT_REST] * (not contacts and k == len(solver.substeps) - 1)
         if not fresh or contacts:

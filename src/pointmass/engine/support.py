@@ -122,8 +122,10 @@ def _compiled_select(condition: Any, a: Any, b: Any) -> Any:
 
 
 def columns(target: Any, o: Any, width: int, source: Any, rows: Any, q: Any, step: int) -> None:
-    """Turn eight records of eight numbers into columns: those of the rows[q], rows[q + step], ... of `source`, the first
-    six of whose numbers go to `target` at o, o + width, ..., one record beside the other."""
+    """Turn the first six numbers of eight records of eight into columns.
+
+    Records are those of the rows[q], rows[q + step], ... of `source`. Columns go to `target` at o, o + width, ...
+    """
     for j in range(8):
         record = 8 * int(rows[int(q) + j * step])
         for c in range(6):
@@ -148,17 +150,14 @@ def _vector(context: Any, builder: Any, kind: Any, array: Any, index: Any, count
 
 
 def _interleaved(builder: Any, a: Any, b: Any, size: int, high: bool) -> Any:
-    """Groups of `size` numbers by turns from two vectors of eight: of each half (or quarter, ...) of 2 size numbers the
-    low groups, or the high ones."""
+    """Groups of `size` numbers from two vectors of eight by turns: every other group, from the first or the second."""
     low = range(size * high, 8, 2 * size)
     mask = [8 * other + begin + k for begin in low for other in (0, 1) for k in range(size)]
     return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(ir.IntType(32), 8), mask))
 
 
 @intrinsic
-def _columns(
-    typingctx: Any, target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any
-) -> Any:
+def _columns(typingctx: Any, target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         target, o, width, source, rows, q, step = arguments
         kinds = dict(zip(("target", "source", "rows"), (signature.args[k] for k in (0, 3, 4)), strict=True))
@@ -217,7 +216,7 @@ def _compiled_columns(target: Any, o: Any, width: Any, source: Any, rows: Any, q
 @overload(added, inline="always")
 def _compiled_added(target: Any, o: Any, source: Any, q: Any) -> Any:
     def compiled(target: Any, o: Any, source: Any, q: Any) -> Any:
-        return _added(target, o, source, q)  # type: ignore[call-arg]
+        return _added(target, o, source, q)
 
     return compiled
 
@@ -225,6 +224,6 @@ def _compiled_added(target: Any, o: Any, source: Any, q: Any) -> Any:
 @overload(subtracted, inline="always")
 def _compiled_subtracted(target: Any, o: Any, source: Any, q: Any) -> Any:
     def compiled(target: Any, o: Any, source: Any, q: Any) -> Any:
-        return _subtracted(target, o, source, q)  # type: ignore[call-arg]
+        return _subtracted(target, o, source, q)
 
     return compiled
