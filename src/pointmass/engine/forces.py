@@ -124,18 +124,18 @@ class Deriv:
 
     @property
     def scratch(self) -> dict[str, str]:
-        """What elements need besides -> how it is made, for `tiles` tiles at once.
+        """What elements need besides -> how it is made.
 
-        M[0] is the largest number of particles of an island.
+        M[0] is the largest number of particles of an island, M[-1] the number of tiles at work.
         """
         if not self.families:
             return {}
         nodes = max(f.force.nodes for f in self.families)
         return {
             "records": f"np.empty({RECORD} * M[0], R)",
-            "totals": f"np.empty({TOTAL} * (M[0] + {APART} * tiles), R)",
-            "lanes": f"np.zeros((tiles, {6 * nodes * LANES}), R)",
-            "acts": f"np.empty((tiles, {TOTAL * nodes * LANES}), R)",
+            "totals": f"np.empty({TOTAL} * (M[0] + {APART} * M[-1]), R)",
+            "lanes": f"np.zeros((M[-1], {6 * nodes * LANES}), R)",
+            "acts": f"np.empty((M[-1], {TOTAL * nodes * LANES}), R)",
         }
 
     def _printed(self) -> str:

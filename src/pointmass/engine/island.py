@@ -151,7 +151,8 @@ class IslandKernel:
 
     @property
     def scratch(self) -> list[str]:
-        """Statements that make what an island needs; M has the largest counts of particles and of elements."""
+        """Statements that make what an island needs; M has the largest counts of particles and of elements, and that of
+        tiles."""
         contact = self.deriv.contact
         families = enumerate(self.deriv.families)
         lines = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{k + 1}], R)" for k, f in families if f.implicit]
@@ -317,8 +318,7 @@ class IslandKernel:
         ]
         data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers), *tiles.values()])
         grid = ", ".join([*self.memory, "birth, t0, dt, k0, count, lengths, controls, work, status, reach"])
-        made = [f"tiles = {'len(tiling) - 1' if deriv.parallel else 1}"] * bool(elements)
-        loop = [*made, *self.scratch, "for island in range(lo, hi):", *indented(island, 1)]
+        loop = [*self.scratch, "for island in range(lo, hi):", *indented(island, 1)]
         head = ["@njit(**ENTRY)", f"def run(lo, hi, first, x, v, {data}, M, {grid}):"]
         return "\n".join([*head, *indented(loop, 1), ""])
 
@@ -412,6 +412,7 @@ class IslandMembers:
             data += pairs.arrays()
             home = np.searchsorted(self.first, pairs.rows[0], side="right") - 1 if len(pairs.rows) else islands
             starts.append(np.where(np.arange(islands + 1) > home, len(pairs.rows), 0))
+        most.append(len(self.tiling) - 1 if deriv.parallel else 1)
         begin = np.full(islands, -np.inf) if births is None else np.maximum.reduceat(births, self.first[:-1])
         control, work = np.zeros((islands, len(CONTROL))), np.zeros((islands, 5), np.int64)
         if CONTROL[0] in memory:
