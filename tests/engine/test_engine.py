@@ -13,6 +13,7 @@ import pytest
 import pointmass as pm
 from pointmass.engine import store
 from pointmass.engine.engine import Engine
+from pointmass.engine.forces import tiled
 from pointmass.engine.island import Span
 from pointmass.engine.reference import ReferenceEngine
 from pointmass.forces import FORCES
@@ -161,6 +162,55 @@ def large(n: int = 1000) -> pm.ParticleSystem:
     links = rng.permutation(n)[: 3 * (n // 9)].reshape(-1, 3)
     springs = pm.Springs(np.concatenate([links[:, :2], links[:, 1:]]), 30.0, 0.2, rest=0.5)
     return pm.ParticleSystem(particles, [pm.Gravity(), pm.Drag(0.1), springs])
+
+
+def net(dtype: Any = np.float64, n: int = 300) -> pm.ParticleSystem:
+    """One island in random order, of elements of two and of three particles, and forces before, between and behind."""
+    rng = np.random.default_rng(3)
+    particles = pm.Particles(rng.uniform(-1, 1, (n, 3)), rng.uniform(-1, 1, (n, 3)), dtype=dtype)
+    particles.pin([0, 7])
+    way = rng.permutation(n)
+    ring = np.stack([way, np.roll(way, 1)], axis=1)
+    threes = np.stack([way, np.roll(way, 1), np.roll(way, 2)], axis=1)
+    forces = [
+        corner(elements=threes[::3]),
+        pm.Gravity(),
+        pm.Springs(ring, 30.0, 0.2, rest=rng.uniform(0.1, 0.9, n)),
+        pm.Angles(threes, 2.0, 0.1, rest="0.5 + t"),
+        pm.Drag(0.1),
+        pm.Springs(ring[::2, ::-1], 3.0),
+    ]
+    return pm.ParticleSystem(particles, forces)
+
+
+@pytest.mark.usefixtures("plain")
+@pytest.mark.parametrize("solver", [pm.SymplecticEuler(), pm.Leapfrog(), pm.RK4(), pm.Yoshida4()], ids=repr)
+def test_tiles_of_a_large_island(solver: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pointmass.engine.engine.LARGE", 100)
+    monkeypatch.setattr("numba.get_num_threads", lambda: 3)
+    same(*both(net, solver, steps=2))
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_compiled_tiles(dtype: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pointmass.engine.engine.LARGE", 100)
+    monkeypatch.setattr("numba.get_num_threads", lambda: 3)
+    slow, fast = both(lambda: net(dtype), pm.Leapfrog(), steps=50, cuts=(20,))
+    if dtype == np.float64:
+        same(slow, fast)
+    else:
+        np.testing.assert_allclose(fast.particles.x, slow.particles.x, rtol=1e-3, atol=1e-3)
+
+
+def test_an_element_between_tiles_is_in_each_of_them() -> None:
+    rng = np.random.default_rng(2)
+    places, cuts = rng.integers(0, 100, (500, 3)), np.array([0, 30, 64, 100])
+    found = tiled(places, cuts, np.zeros(3, np.int64))
+    for tile in range(3):
+        mine = found.order[found.start[tile] : found.start[tile + 1]]
+        touched = ((places >= cuts[tile]) & (places < cuts[tile + 1])).any(axis=1)
+        np.testing.assert_array_equal(mine, np.flatnonzero(touched))
+    np.testing.assert_array_equal(found.nodes.reshape(-1, 3), places[found.order])
 
 
 def test_batches_of_any_size_and_any_order_of_islands() -> None:

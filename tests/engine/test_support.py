@@ -1,4 +1,4 @@
-"""Bit operations of printed kernels against NumPy's, compiled and plain."""
+"""What printed kernels call against NumPy, compiled and plain."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numba
 import numpy as np
 import pytest
 
-from pointmass.engine.support import exponent, scaled, significand
+from pointmass.engine.support import added, columns, exponent, scaled, significand, subtracted
 
 
 @numba.njit(error_model="numpy")
@@ -38,3 +38,28 @@ def test_as_numpy(run, dtype):
     f, e = np.frexp(a)
     assert np.array_equal(result[1], f, equal_nan=True)
     assert np.array_equal(result[2][np.isfinite(a)], e[np.isfinite(a)])
+
+
+@numba.njit(error_model="numpy")
+def move(records, rows, turned, totals, acts):
+    columns(turned, np.uintp(3), 11, records, rows, np.uintp(1), 2)
+    added(totals, np.uintp(4), acts, np.uintp(8))
+    subtracted(totals, np.uintp(8), acts, np.uintp(0))
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("run", [move, move.py_func], ids=["compiled", "plain"])
+def test_records_become_columns_and_are_added(run, dtype):
+    rng = np.random.default_rng(1)
+    records = rng.normal(size=(20, 8)).astype(dtype)
+    rows = rng.permutation(20).astype(np.int32)
+    turned, totals, acts = np.zeros(80, dtype), rng.normal(size=16).astype(dtype), rng.normal(size=16).astype(dtype)
+    before = totals.copy()
+    run(records.ravel(), rows, turned, totals, acts)
+    wanted = np.zeros(80, dtype)
+    for c in range(6):
+        wanted[3 + 11 * c :][:8] = records[rows[1:16:2], c]
+    assert np.array_equal(turned, wanted)
+    before[4:8] += acts[8:12]
+    before[8:12] -= acts[:4]
+    assert np.array_equal(totals, before)

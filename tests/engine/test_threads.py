@@ -49,15 +49,44 @@ hash.update(particles.x.tobytes())
 print(hash.hexdigest())
 """
 
+LARGE = """
+import hashlib
+import numpy as np
+import pointmass as pm
 
-def digest(threads: int) -> str:
+rng = np.random.default_rng(1)
+n = 5000
+x = rng.uniform(-1, 1, (n, 3))
+ring = np.stack([np.arange(n), np.roll(np.arange(n), 1)], axis=1)
+chords = rng.integers(0, n, (2 * n, 2))
+chords = chords[chords[:, 0] != chords[:, 1]]
+hash = hashlib.sha256()
+for dtype in ("float64", "float32"):
+    particles = pm.Particles(x, m=rng.uniform(0.5, 2, n), dtype=dtype)
+    forces = [
+        pm.Springs(ring, 5.0, 0.1, rest=rng.uniform(0.1, 0.5, n)),
+        pm.Attractor(2.0, eps=0.3),
+        pm.Springs(chords, 2.0, 0.1, rest=0.3),
+        pm.Angles(np.stack([np.roll(np.arange(n), k) for k in (0, 1, 2)], axis=1)[: n // 2], 0.1, 0.01, rest=0.5),
+        pm.QuadraticDrag(0.1),
+    ]
+    sim = pm.Simulation(pm.ParticleSystem(particles, forces), pm.RK4(), 1 / 240, compiled=True)
+    sim.step(10)
+    assert np.isfinite(particles.x).all()
+    hash.update(particles.x.tobytes() + particles.v.tobytes())
+print(hash.hexdigest())
+"""
+
+
+def digest(program: str, threads: int) -> str:
     environment = {**os.environ, "NUMBA_NUM_THREADS": str(threads)}
-    done = subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
     return done.stdout
 
 
-def test_one_two_three_and_seven_threads_give_the_same_bits() -> None:
-    assert len({digest(threads) for threads in (1, 2, 3, 7)}) == 1
+@pytest.mark.parametrize("program", [PROGRAM, LARGE], ids=["many islands", "a large one"])
+def test_one_two_three_and_seven_threads_give_the_same_bits(program: str) -> None:
+    assert len({digest(program, threads) for threads in (1, 2, 3, 7)}) == 1
 
 
 @pytest.mark.parametrize(("asked", "answer"), [("1", "1"), ("none", "POINTMASS_THREADS = none is not allowed")])

@@ -1,7 +1,13 @@
 """Prints `deriv`: the accelerations of an island (order 1: its velocities), the lecture's clear, calculate and gather.
 
-Elements are evaluated once each, into a buffer; then every particle adds up what acts on it, force by force in listed
-order and element by element: nothing is scattered, so the bits depend on no thread.
+The particles of an island fall into tiles, a thread each, or into one. A tile goes through all elements that touch it,
+in their order, and adds what they do to its own particles: an element between two tiles is evaluated by both, so no
+two threads write to one place, every particle adds up its forces in the order of the forces and of their elements, and
+the bits depend on no thread.
+
+An element reads its nodes from all over memory, and that is what takes the time, so a node is read at once: the state
+of a particle is a record, and the records of some elements are turned into columns, on which the law is a loop of
+vectors; what comes out are records again, each added to a particle in one go.
 """
 
 from __future__ import annotations
@@ -25,6 +31,15 @@ from pointmass.tracing.columns import expanded
 from pointmass.tracing.program import Program
 from pointmass.tracing.trace import Traced, vector_names
 
+LANES = 64  # elements that a law is evaluated for in one go
+RECORD = 8  # numbers of a particle's state, 6 of them used: one load, and one line of the cache
+TOTAL = 4  # numbers of a particle's force, 3 of them used
+APART = 16  # rows between what two threads write all the time
+ZERO = [f"f_{a} = R(0)" for a in "xyz"]
+PARTICLE = ["g = base + i", *(f"o_{a} = np.uintp(3 * i + {k})" for k, a in enumerate("xyz"))]
+
+Terms = list[tuple[int, str] | None]
+
 
 @dataclass
 class Elements:
@@ -32,25 +47,27 @@ class Elements:
 
     Attributes
     ----------
-    number : of the family; the arrays of the kernel are named after it: E (nodes), D (columns), J and I (incidence), B
-        (buffer of forces), and s, e (its range in the island).
+    number : of the family; the arrays of the kernel are named after it: N (nodes), L (columns) and T (ranges), tile by
+        tile; for the blocks of implicit solvers also E (nodes) and D (columns), element by element, J and I
+        (incidence), B (buffer of forces), and s, e (its range in the island).
+    tiled, table : columns tile by tile, and element by element.
     """
 
     force: ElementForce
     number: int
+    tiled: Table
     table: Table
+    implicit: bool
 
     @property
     def arguments(self) -> list[str]:
         """Arrays of the kernel."""
-        j = self.number
-        return [f"E{j}", f"D{j}", f"J{j}", f"I{j}"]
+        return [f"{name}{self.number}" for name in ("NLEDJI" if self.implicit else "NL")]
 
     @property
     def locals(self) -> list[str]:
-        """What a call for one island takes besides: buffer and range."""
-        j = self.number
-        return [f"B{j}", f"s{j}", f"e{j}"]
+        """What a call for one island takes besides: buffer and ranges."""
+        return [f"{name}{self.number}" for name in ("TBse" if self.implicit else "T")]
 
 
 class Deriv:
@@ -67,18 +84,18 @@ class Deriv:
     Parameters
     ----------
     parallel : whether its loops are those of all threads.
-    lagged : whether resting contact is that of the start of a piece (implicit solvers).
+    implicit : whether resting contact is that of the start of a piece, and elements have blocks of a Jacobian.
     alone : whether it is for particles that are islands of their own, on which no element acts.
     binder : that another kernel uses too.
     """
 
     def __init__(
-        self, system: ParticleSystem, parallel: bool, lagged: bool, alone: bool = False, binder: Binder | None = None
+        self, system: ParticleSystem, parallel: bool, implicit: bool, alone: bool = False, binder: Binder | None = None
     ) -> None:
-        self.system, self.alone = system, alone
+        self.system, self.parallel, self.implicit, self.alone = system, parallel, implicit, alone
         self.contact: ContactText | None = None
         if system.colliders:
-            self.contact = ContactText(surfaces_of(system), system.order, lagged, str(system.particles.dtype))
+            self.contact = ContactText(surfaces_of(system), system.order, implicit, str(system.particles.dtype))
         self.order = system.order
         self.binder = binder or Binder(system.particles, Table("C"))
         self.families: list[Elements] = []
@@ -103,55 +120,94 @@ class Deriv:
             [a for f in self.families for a in f.locals]
             + [a for p in self.pairs for a in p.locals]
             + ["K"] * (self.contact is not None)
+            + ["cuts", *self.scratch] * bool(self.families)
         )
         return ", ".join(["base", "n", *self.data, *own])
 
+    @property
+    def scratch(self) -> dict[str, str]:
+        """What elements need besides -> how it is made.
+
+        M[0] is the largest number of particles of an island, M[-1] the number of tiles at work.
+        """
+        if not self.families:
+            return {}
+        nodes = max(f.force.nodes for f in self.families)
+        return {
+            "records": f"np.empty({RECORD} * M[0], R)",
+            "totals": f"np.empty({TOTAL} * (M[0] + {APART} * M[-1]), R)",
+            "lanes": f"np.zeros((M[-1], {6 * nodes * LANES}), R)",
+            "acts": f"np.empty((M[-1], {TOTAL * nodes * LANES}), R)",
+        }
+
     def _printed(self) -> str:
-        elements, sums = [], []
+        before: list[str] = []  # what all particles wait for
+        stages: list[list[str]] = [[]]  # forces on a particle, and between them elements in loops of their own
         for k, force in enumerate(self.system.forces):
             if isinstance(force, UnaryForce):
                 timed, lines = unary(self.binder, force, f"f{k}", UNARY, "g")
                 self._at_time += timed
-                sums += lines
+                stages[-1] += lines
             elif isinstance(force, ElementForce) and not self.alone:
-                evaluate, gather = self._elements(force, f"f{k}")
-                elements += evaluate
-                sums += gather
+                stages += [self._elements(force, f"f{k}"), []]
             elif isinstance(force, PairForce) and not self.alone:
-                evaluate, gather = self._pairs(force)
-                elements += evaluate
-                sums += gather
+                evaluate, lines = self._pairs(force)
+                before += evaluate
+                stages[-1] += lines
+        last = stages.pop()
         w = self.binder.attribute("w", "g")
-        last = [f"k[o{a}] = f_{a} * w if free else R(0)" for a in "xyz"]
-        if self.order == 1:
-            last = [f"k[o{a}] = f_{a} if free else R(0)" for a in "xyz"]
-        particle = [
-            "g = base + i",
-            "o_x = np.uintp(3 * i)",
-            "o_y = np.uintp(3 * i + 1)",
-            "o_z = np.uintp(3 * i + 2)",
-            *(f"f_{a} = R(0)" for a in "xyz"),
-            *sums,
-            *self._bear(),
-            f"w = {w}",
-            "free = w != 0",
-            *(line.replace("[o", "[o_") for line in last),
-        ]
-        lines = [
-            f"@njit({self.flags})",
-            f"def deriv({self.call}, t, x, v, k):",
-            *indented(self.binder.numbers.lines(), 1),
-            "    status = 0",
-            *indented(self._at_time, 1),
-            *indented(elements, 1),
-            f"    for i in {self.loop}(n):",
-            *indented(particle, 2),
-            "    return status",
-            "",
-        ]
+        rate = "f_{0} * w" if self.order == 2 else "f_{0}"
+        last += [*self._bear(), f"w = {w}", "free = w != 0"]
+        last += [f"k[o_{a}] = {rate.format(a)} if free else R(0)" for a in "xyz"]
+        numbers = self.binder.numbers.lines()
         contact = "" if self.contact is None else self.contact.text
-        pairs = "".join(f"{p.text}\n\n" for p in self.pairs)
-        return contact + self.binder.functions + pairs + "\n".join(lines)
+        parts = [contact, self.binder.functions, *(f"{p.text}\n\n" for p in self.pairs)]
+        if not self.families:
+            loop = [f"for i in {self.loop}(n):", *indented([*PARTICLE, *ZERO, *last], 1)]
+            body = [*self._at_time, *before, *loop]
+        else:
+            tile = [*self._at_time, *self._tile(stages, last)]
+            body = [
+                *before,
+                f"for i in {self.loop}(n):",
+                *(f"    records[{RECORD} * i + {c}] = {q}[3 * i + {c % 3}]" for c, q in enumerate("xxxvvv")),
+            ]
+            if self.parallel:
+                parts.append(
+                    _function("tile_of", f"tile, {self.call}, t, x, v, k", "**FLAGS", [*numbers, "status = 0", *tile])
+                )
+                body += [
+                    "worst = 0",
+                    "for tile in prange(len(cuts) - 1):",
+                    f"    worst = max(worst, tile_of(tile, {self.call}, t, x, v, k))",
+                    "status |= worst",
+                ]
+            else:
+                body += ["tile = 0", *tile]
+        main = _function("deriv", f"{self.call}, t, x, v, k", self.flags, [*numbers, "status = 0", *body])
+        return "".join([*parts, main]).removesuffix("\n\n")
+
+    def _tile(self, stages: list[list[str]], last: list[str]) -> list[str]:
+        """Statements that go through the forces on the particles of a tile."""
+        lines = [
+            "lo = cuts[tile] - base",
+            "hi = cuts[tile + 1] - base",
+            "begin = np.uintp(lo)",
+            "own = np.uintp(hi - lo)",
+            f"spare = np.uintp(n + {APART} * tile)  # where goes what acts on the particles of others",
+            "s = lanes[tile]",
+            "z = acts[tile]",
+        ]
+        known = ZERO
+        for k, stage in enumerate([*stages, last]):
+            if k % 2:
+                lines += stage
+            elif stage or not k:
+                keep = [f"totals[{TOTAL} * i + {c}] = {f}" for c, f in enumerate(("f_x", "f_y", "f_z", "R(0)"))]
+                keep *= k < len(stages)
+                lines += ["for i in range(lo, hi):", *indented([*PARTICLE, *known, *stage, *keep], 1)]
+                known = [f"f_{a} = totals[{TOTAL} * i + {c}]" for c, a in enumerate("xyz")]
+        return lines
 
     def _pairs(self, force: PairForce) -> tuple[list[str], list[str]]:
         """Statements that evaluate all pairs, and those that add what they do to a particle."""
@@ -175,53 +231,72 @@ class Deriv:
             "    f_x, f_y, f_z = R(b_x), R(b_y), R(b_z)",
         ]
 
-    def _elements(self, force: ElementForce, tag: str) -> tuple[list[str], list[str]]:
-        """Statements that evaluate elements into their buffer, and those that add them up on a particle."""
+    def _elements(self, force: ElementForce, tag: str) -> list[str]:
+        """Statements that go through the elements of a tile and add what they do to its particles."""
         j, nodes = len(self.families) + len(self.pairs), force.nodes
-        table = Table(f"D{j}")
-        self.families.append(Elements(force, j, table))
+        table = Table(f"L{j}")
+        self.families.append(Elements(force, j, table, Table(f"D{j}"), self.implicit))
         state = {"t": "R(t)"}
-        for a in range(nodes):
-            for q in "xv":
-                names = vector_names(f"{q}{a + 1}")
-                state |= {name: f"{q}[n{a} + np.uintp({axis})]" for axis, name in enumerate(names)}
+        for node in range(nodes):
+            for k, q in enumerate("xv"):
+                for axis, name in enumerate(vector_names(f"{q}{node + 1}")):
+                    state[name] = f"s[i + np.uintp({(6 * node + 3 * k + axis) * LANES})]"
         law, terms = different(force.traced)
-        opposite = nodes == 2 and all(_opposite(a, b) for a, b in zip(terms[:3], terms[3:], strict=True))
-        text: Text = self.binder.law(law if opposite else force.traced, force, state, "u", table, tag)
+        text: Text = self.binder.law(law, force, state, "u", table, tag)
         self._at_time += text.at_time
-        switch = self.binder.switch(force)
-        count = len(text.outputs)  # numbers of an element in the buffer
-        evaluate = [
-            f"# {force.name}",
-            f"if {switch} != 0:",
-            f"    for element in {self.loop}(s{j}, e{j}):",
-            "        u = np.uintp(element)",
-            *(
-                f"        n{a} = np.uintp(3) * np.uintp(E{j}[np.uintp({nodes}) * u + np.uintp({a})])"
-                for a in range(nodes)
-            ),
-            *indented(text.lines, 2),
-            f"        b = np.uintp({count}) * (u - np.uintp(s{j}))",
-            *(f"        B{j}[b + np.uintp({k})] = {out}" for k, out in enumerate(text.outputs)),
+        zero = literal(0.0, self.binder.dtype)
+        values = [zero if term is None else f"{term[1].strip('+')}{text.outputs[term[0]]}" for term in terms]
+        kept: list[Terms] = []  # what acts on a node, if it is neither that on one before it nor its negative
+        write, add = [], []
+        for node in range(nodes):
+            mine, place, way = terms[3 * node : 3 * node + 3], len(kept), "added"
+            if mine in kept:
+                place = kept.index(mine)
+            elif _negative(mine) in kept:
+                place, way = kept.index(_negative(mine)), "subtracted"
+            else:
+                kept.append(mine)
+                for c, value in enumerate([*values[3 * node : 3 * node + 3], zero]):
+                    write.append(f"z[b + np.uintp({TOTAL * LANES * place + c})] = {value}")
+            add += [
+                f"row = np.uintp(N{j}[e + np.uintp({node})])",
+                "row = row if row - begin < own else spare",
+                f"{way}(totals, np.uintp({TOTAL}) * row, z, b + np.uintp({TOTAL * LANES * place}))",
+            ]
+        # Vectors round another way than single numbers: which elements are left over must not depend on the tiles.
+        lanes = str(LANES) if self.parallel else "count"
+        item = ["i = np.uintp(lane)", f"e = np.uintp({nodes}) * (np.uintp(first) + i)"]
+        turn = [
+            f"columns(s, i + np.uintp({6 * LANES * node}), {LANES}, records, N{j}, e + np.uintp({node}), {nodes})"
+            for node in range(nodes)
         ]
-        gather = [
+        return [
             f"# {force.name}",
-            f"if {switch} != 0:",
-            f"    for entry in range(J{j}[g], J{j}[g + 1]):",
-            f"        u = np.uintp(I{j}[np.uintp(entry)])",
+            f"if {self.binder.switch(force)} != 0:",
+            f"    for first in range(T{j}[tile], T{j}[tile + 1], {LANES}):",
+            f"        count = min({LANES}, T{j}[tile + 1] - first)",
+            "        for lane in range(0, count - 7, 8):",
+            *indented([*item, *turn], 3),
+            "        for lane in range(count - count % 8, count):",
+            *indented(item, 3),
+            f"            for node in range({nodes}):",
+            f"                row = np.uintp({RECORD}) * np.uintp(N{j}[e + np.uintp(node)])",
+            "                for c in range(6):",
+            f"                    s[i + np.uintp({6 * LANES} * node + {LANES} * c)] = records[row + np.uintp(c)]",
+            f"        for lane in range({lanes}):",
+            "            i = np.uintp(lane)",
+            "            u = np.uintp(first) + i",
+            f"            b = np.uintp({TOTAL}) * i",
+            *indented([*text.lines, *write], 3),
+            "        for lane in range(count):",
+            *indented([*item, f"b = np.uintp({TOTAL}) * i", *add], 3),
         ]
-        if opposite:
-            gather += [f"        b = np.uintp({count}) * (u >> np.uintp(1))"]
-            gather += ["        second = (u & np.uintp(1)) != np.uintp(0)"]
-            for axis, first, other in zip("xyz", terms[:3], terms[3:], strict=True):
-                if first is not None and other is not None:
-                    gather.append(f"        q = B{j}[b + np.uintp({first[0]})]")
-                    ends = ("-q", "q") if first[1] == "-" else ("q", "-q")
-                    gather.append(f"        f_{axis} = f_{axis} + select(second, {ends[1]}, {ends[0]})")
-        else:
-            gather.append("        b = np.uintp(3) * u")
-            gather += [f"        f_{a} = f_{a} + B{j}[b + np.uintp({k})]" for k, a in enumerate("xyz")]
-        return evaluate, gather
+
+
+def _function(name: str, arguments: str, flags: str, lines: list[str]) -> str:
+    """A function that returns a status."""
+    head = [f"@njit({flags})", f"def {name}({arguments}):"]
+    return "\n".join([*head, *indented([*lines, "return status"], 1), "", "", ""])
 
 
 def unary(
@@ -246,12 +321,12 @@ def unary(
     return text.at_time, [f"# {force.name}", *text.lines, *adds]
 
 
-def _opposite(a: tuple[int, str] | None, b: tuple[int, str] | None) -> bool:
-    """Whether two outputs of a law (see `different`) are each other's negative."""
-    return a == b if a is None or b is None else a[0] == b[0] and a[1] != b[1]
+def _negative(terms: Terms) -> Terms:
+    """Terms with the other sign (see `different`)."""
+    return [None if term is None else (term[0], "+" if term[1] == "-" else "-") for term in terms]
 
 
-def different(traced: Traced) -> tuple[Traced, list[tuple[int, str] | None]]:
+def different(traced: Traced) -> tuple[Traced, Terms]:
     """A law without the outputs that are another one with the other sign.
 
     Returns
@@ -261,7 +336,7 @@ def different(traced: Traced) -> tuple[Traced, list[tuple[int, str] | None]]:
     """
     program = expanded(traced.program)
     found: dict[int, int] = {}
-    terms: list[tuple[int, str] | None] = []
+    terms: Terms = []
     for node in program.outputs:
         op, *rest = program.nodes[node]
         if op == "const" and rest[0] == 0:
@@ -315,3 +390,41 @@ def incidence(rows: NDArray[np.intp], place: NDArray[np.intp], first: NDArray[np
     ends = np.searchsorted(places.ravel()[by_row], np.arange(first[-1] + 1), side="left").astype(np.int64)
     local = places - first[island][:, None]
     return Incidence(order, local.astype(np.int32).ravel(), start, ends, own.ravel()[by_row].astype(np.int32))
+
+
+@dataclass(frozen=True, eq=False)
+class Tiled:
+    """The elements of a family tile by tile; one between several tiles is there for each.
+
+    Attributes
+    ----------
+    order : of the elements: tile by tile, and within one by their number, shape (e,).
+    nodes : row of each node within its island, shape (e * k,).
+    start : first element of each tile, shape (tiles + 1,).
+    """
+
+    order: NDArray[np.intp]
+    nodes: NDArray[np.int32]
+    start: NDArray[np.int64]
+
+
+def tiled(places: NDArray[np.intp], cuts: NDArray[np.int64], first: NDArray[np.int64]) -> Tiled:
+    """Sort elements into tiles.
+
+    Parameters
+    ----------
+    places : rows of each element, shape (e, k).
+    cuts : first row of each tile, shape (tiles + 1,).
+    first : first row of the island of each tile, shape (tiles,).
+    """
+    tile = np.searchsorted(cuts, places, side="right") - 1
+    anew = np.ones(tile.shape, bool)
+    for node in range(1, tile.shape[1]):
+        anew[:, node] = (tile[:, :node] != tile[:, node : node + 1]).all(axis=1)
+    element, which = np.nonzero(anew)
+    tile = tile[element, which]
+    by_tile = np.argsort(tile, kind="stable")
+    order, tile = element[by_tile], tile[by_tile]
+    start = np.searchsorted(tile, np.arange(len(cuts)), side="left").astype(np.int64)
+    local = places[order] - first[tile][:, None]
+    return Tiled(order, local.astype(np.int32).ravel(), start)

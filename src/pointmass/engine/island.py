@@ -18,7 +18,7 @@ from pointmass.engine import store
 from pointmass.engine.adaptive import control_text
 from pointmass.engine.binding import Binder
 from pointmass.engine.blocks import Kind, Layout, layout, slices
-from pointmass.engine.forces import Deriv, Incidence, incidence
+from pointmass.engine.forces import LANES, Deriv, Incidence, incidence, tiled
 from pointmass.engine.impacts import WORK, Impacts
 from pointmass.engine.implicit import implicit_text
 from pointmass.engine.pairs import FULL, PairArrays
@@ -142,7 +142,7 @@ class IslandKernel:
     def work(self) -> list[str]:
         """Arrays that an island needs while it is advanced, each of length 3n."""
         more = [] if self.impacts is None else [*WORK, "av"]
-        return [*self.step.work, "x1", "v1", *more]
+        return [*self.step.work, *([] if self.step.in_place else ["x1", "v1"]), *more]
 
     @property
     def memory(self) -> list[str]:
@@ -159,11 +159,12 @@ class IslandKernel:
 
     @property
     def scratch(self) -> list[str]:
-        """Statements that make what a thread needs for an island; M has the largest counts of particles and of
-        elements."""
+        """Statements that make what a thread needs for an island; M has the largest counts of particles, of elements, of
+        what the blocks of a matrix take, and last that of tiles."""
         contact = self.deriv.contact
         families = enumerate(self.deriv.families)
-        lines = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{k + 1}], R)" for k, f in families]
+        lines = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{k + 1}], R)" for k, f in families if f.implicit]
+        lines += [f"{name} = {make}" for name, make in self.deriv.scratch.items()]
         lines += [f"{name} = np.empty(3 * M[0], R)" for name in self.work]
         lines += ["known = np.zeros(1, np.int64)"] * self.step.keeps
         lines += [f"{name} = {make}" for name, make in self.step.scratch.items()]
@@ -257,7 +258,7 @@ class IslandKernel:
             f"    done[1] += {step.evaluations}",
             *indented(judged, 1),
             *indented(after, 1),
-            *indented(each(deriv.loop, self._w, keep), 1),
+            *indented([] if step.in_place else each(deriv.loop, self._w, keep), 1),
             *indented(beyond, 1),
             "return status",
         ]
@@ -288,10 +289,13 @@ class IslandKernel:
     def _run(self) -> str:
         """The kernel itself: the islands of a group over a span."""
         deriv = self.deriv
-        numbers = [f.number for f in deriv.families] + [p.number for p in deriv.pairs]
+        elements = [f.number for f in deriv.families]
+        numbers = elements * deriv.implicit + [p.number for p in deriv.pairs]
         ranges = [line for j in numbers for line in (f"s{j} = S{j}[island]", f"e{j} = S{j}[island + 1]")]
         kinds = self.step.kinds
         ranges += ["slices = first_slice[island]"] if kinds else []
+        tiles = {f"T{j}": f"tiles{j}" for j in elements} | ({"cuts": "tiling"} if elements else {})
+        ranges += [f"{name} = {all_}" + "[island:island + 2]" * (not deriv.parallel) for name, all_ in tiles.items()]
         lists = [f"K{p.number}[0] = 0" for p in deriv.pairs if p.near]
         lists += ["known[0] = 0"] * (self.step.keeps and bool(lists))
         lists += ["warm_[:] = R(0)"] if "warm" in self.memory else []
@@ -323,7 +327,7 @@ class IslandKernel:
             "reach[island, 1] = fast",
         ]
         layouts = [*self.step.arrays, "first_slice"] if kinds else []
-        data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers), *layouts])
+        data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers), *layouts, *tiles.values()])
         grid = ", ".join([*self.memory, "birth, t0, dt, k0, count, lengths, controls, work, status, reach"])
         given = f"lo, hi, first, x, v, {data}, {grid}"
         made = ", ".join(line.split(" = ")[0] for line in self.scratch)
@@ -369,21 +373,50 @@ class IslandMembers:
         self.place[rows] = np.arange(len(rows))
         everybody = len(rows) == len(self.place) and bool((np.diff(rows) == 1).all())
         self.order = None if everybody else rows
-        self.families = [self._family(f.force) for f in kernel.deriv.families]
         self.pairs = [PairArrays(p, kernel.system.particles, self.place) for p in kernel.deriv.pairs]
+        elements = [self._elements(f.force) for f in kernel.deriv.families]
+        self.families = [self._family(*each) for each in elements] if kernel.deriv.implicit else []
+        places = [self.place[nodes] for _, nodes in elements]
+        self.tiling = self._tiling(places) if kernel.deriv.parallel else self.first
+        first = 0 * self.tiling[:-1] if kernel.deriv.parallel else self.first[:-1]
+        self.tiles = [tiled(rows, self.tiling, first) for rows in places]
+        # A law is evaluated for so many elements at once, also for the last ones.
+        self.tiled = [
+            np.append(mine[t.order], np.repeat(mine[t.order[-1:]], LANES - 1))
+            for (mine, _), t in zip(elements, self.tiles, strict=True)
+        ]
         self.layouts = [self._layout(kind) for kind in kernel.step.kinds]
 
-    def _family(self, force: Any) -> tuple[Rows, Incidence]:
-        """Elements of a force in the order of the kernel, and where they are."""
+    def _elements(self, force: Any) -> tuple[Rows, Rows]:
+        """Numbers and particles of the elements of a force that are in the group."""
         nodes = force.rows(self.kernel.system.particles)
         mine = np.flatnonzero(self.place[nodes[:, 0]] >= 0)
-        found = incidence(nodes[mine], self.place, self.first)
+        return mine, nodes[mine]
+
+    def _family(self, mine: Rows, nodes: Rows) -> tuple[Rows, Incidence]:
+        """Elements in the order of the kernel, and where they are."""
+        found = incidence(nodes, self.place, self.first)
         return mine[found.order], found
 
     def _layout(self, kind: Kind) -> Layout:
         """Where the blocks of a matrix are."""
         families = [(self.families[k][1], self.kernel.deriv.families[k].force.nodes) for k in kind.families]
         return layout(self.first, families, kind.relative)
+
+    def _tiling(self, places: list[Rows]) -> NDArray[np.int64]:
+        """First rows of the tiles of an island, one for each thread, so that all have as much to do.
+
+        They are multiples of `LANES`, so that the same particles are left over at the end of loops of vectors.
+        """
+        import numba
+
+        work = np.ones(len(self.rows))
+        for rows in places:
+            work += np.bincount(rows.ravel(), minlength=len(work))
+        done = np.cumsum(work)
+        tiles = numba.get_num_threads()
+        inner = np.searchsorted(done, done[-1] * np.arange(1, tiles) / tiles)
+        return np.unique(np.concatenate([[0], inner // LANES * LANES, [len(work)]])).astype(np.int64)
 
     def run(self, x: Array, v: Array, births: Array | None, span: Span, memory: Memory) -> Outcome:
         """Advance positions and velocities, shape (3 * rows,), in place."""
@@ -392,10 +425,13 @@ class IslandMembers:
         data = deriv.binder.data(count, self.order)
         contact = [] if deriv.contact is None else [deriv.contact.table()]
         starts, most = [], [int(np.diff(self.first).max(initial=0))]
-        for family, (elements, found) in zip(deriv.families, self.families, strict=True):
-            data += [found.nodes, family.table.array(len(elements), dtype, elements), found.ends, found.entries]
-            starts.append(found.start)
-            most.append(int(np.diff(found.start).max(initial=0)))
+        for k, family in enumerate(deriv.families):
+            data += [self.tiles[k].nodes, family.tiled.array(len(self.tiled[k]), dtype, self.tiled[k])]
+            if deriv.implicit:
+                elements, found = self.families[k]
+                data += [found.nodes, family.table.array(len(elements), dtype, elements), found.ends, found.entries]
+                starts.append(found.start)
+                most.append(int(np.diff(found.start).max(initial=0)))
         for pairs in self.pairs:
             data += pairs.arrays()
             home = np.searchsorted(self.first, pairs.rows[0], side="right") - 1 if len(pairs.rows) else islands
@@ -403,6 +439,7 @@ class IslandMembers:
         most += [found.most for found in self.layouts]
         layouts = [array for found in self.layouts for array in found.arrays]
         layouts += [slices(self.first)] if layouts else []
+        most.append(len(self.tiling) - 1 if deriv.parallel else 1)
         begin = np.full(islands, -np.inf) if births is None else np.maximum.reduceat(births, self.first[:-1])
         control, work = np.zeros((islands, len(CONTROL))), np.zeros((islands, 5), np.int64)
         if CONTROL[0] in memory:
@@ -422,6 +459,8 @@ class IslandMembers:
             *contact,
             *starts,
             *layouts,
+            *(t.start for t in self.tiles),
+            *[self.tiling] * bool(self.tiles),
             *kept,
             begin,
             *grid,

@@ -16,6 +16,8 @@ from pointmass.solvers.control import control_of
 from pointmass.solvers.explicit import EmbeddedRungeKutta, ExplicitRungeKutta
 from pointmass.solvers.splitting import Splitting
 
+AT_REST = "v[q] = v[q] if free else R(0)"
+
 
 @dataclass(frozen=True)
 class StepText:
@@ -33,6 +35,7 @@ class StepText:
         family's elements of an island.
     memory : arrays of 3 numbers for each particle that the next step reads.
     kinds : of blocks of the matrix, whose layouts the functions read.
+    in_place : whether the step ends in x and v themselves, those who are pinned at rest.
     """
 
     work: list[str]
@@ -44,6 +47,7 @@ class StepText:
     scratch: dict[str, str] = field(default_factory=dict)
     memory: list[str] = field(default_factory=list)
     kinds: list[Kind] = field(default_factory=list)
+    in_place: bool = False
 
     @property
     def arrays(self) -> list[str]:
@@ -63,7 +67,7 @@ def step_text(
     contacts : whether somebody may be `standing` on a surface: then accelerations depend on velocities.
     """
     if isinstance(solver, ExplicitRungeKutta):
-        return _explicit(solver, order, dtype, loop)
+        return _explicit(solver, order, dtype, loop, w, contacts)
     assert isinstance(solver, Splitting)
     return _splitting(solver, dtype, loop, w, velocity_dependent, steady, contacts)
 
@@ -84,7 +88,8 @@ def _weighted(weights: Sequence[float], slopes: str, dtype: str) -> str:
     return " + ".join(f"{literal(w, dtype)} * {slopes}{i}[q]" for i, w in enumerate(weights) if w)
 
 
-def _explicit(solver: ExplicitRungeKutta, order: int, dtype: str, loop: str) -> StepText:
+def _explicit(solver: ExplicitRungeKutta, order: int, dtype: str, loop: str, w: str, contacts: bool) -> StepText:
+    in_place = not contacts and control_of(solver) is None
     parts = [("x", "kx"), ("v", "kv")][:order]
     lines: list[str] = []
     for i, (c, a) in enumerate(solver._stages):
@@ -93,8 +98,8 @@ def _explicit(solver: ExplicitRungeKutta, order: int, dtype: str, loop: str) -> 
             lines += [f"    t{y}[q] = {y}[q] + hr * ({_weighted(a, k, dtype)})" for y, k in parts]
         x, v = ("x", "v") if i == 0 else ("tx", "tv")
         lines.append(f"status |= SLOPE(t + {c!r} * h, {x}, {v}, kx{i}, kv{i})")
-    lines.append(f"for q in {loop}(3 * n):")
-    lines += [f"    {y}1[q] = {y}[q] + hr * ({_weighted(solver._weights, k, dtype)})" for y, k in parts]
+    ends = [f"{y}{'' if in_place else 1}[q] = {y}[q] + hr * ({_weighted(solver._weights, k, dtype)})" for y, k in parts]
+    lines += each(loop, w, [*ends, *[AT_REST] * (in_place and order == 2)])
     stages = len(solver._stages)
     error: list[str] = []
     if control_of(solver) is not None:
@@ -105,7 +110,7 @@ def _explicit(solver: ExplicitRungeKutta, order: int, dtype: str, loop: str) -> 
             size = f"maximum(abs({y}[q]), abs({y}1[q]))"
             error.append(f"    e{y}[q] = (hr * ({_weighted(weights, k, dtype)})) / scale({size})")
     work = [f"{k}{i}" for i in range(stages) for k in ("kx", "kv")] + ["tx", "tv"] + ["ex", "ev"] * bool(error)
-    return StepText(work, lines, stages, error=error)
+    return StepText(work, lines, stages, error=error, in_place=in_place)
 
 
 def _splitting(
@@ -113,31 +118,34 @@ def _splitting(
 ) -> StepText:
     keeps = solver.substeps[-1].closing != 0.0 and steady and not velocity_dependent and not contacts
     start = "status |= DERIV(t, x, v, kv)"
-    lines = [f"for q in {loop}(3 * n):", "    x1[q] = x[q]", "    v1[q] = v[q]"]
-    lines += ["if known[0] == 0:", f"    {start}", "known[0] = 1"] if keeps else [start]
+    lines = ["if known[0] == 0:", f"    {start}", "known[0] = 1"] if keeps else [start]
     passes = solver.passes if velocity_dependent else 1
     evaluations, fresh = 1, True
-    for (opening, drift, closing), (before, after) in zip(solver.substeps, solver._times, strict=True):
+    x1, v1 = ("x1", "v1") if contacts else ("x", "v")
+    for k, ((opening, drift, closing), (before, after)) in enumerate(zip(solver.substeps, solver._times, strict=True)):
+        x, v = ("x", "v") if k == 0 else (x1, v1)
+        rest = [AT_REST] * (not contacts and k == len(solver.substeps) - 1)
         if not fresh or contacts:
-            again = f"status |= DERIV(t + {before!r} * h, x1, v1, kv)"
+            again = f"status |= DERIV(t + {before!r} * h, {x}, {v}, kv)"
             lines += [again] if not fresh else ["if standing > 0:", f"    {again}"]
             evaluations += not fresh
-        lines += [
-            f"kick = {literal(opening, dtype)} * hr",
-            f"drift = {literal(drift, dtype)} * hr",
-            *each(loop, w, ["v1[q] = v1[q] + kick * kv[q]", "x1[q] = x1[q] + drift * (v1[q] if free else R(0))"]),
-        ]
         fresh = closing != 0.0 and not velocity_dependent
+        moves = [
+            f"{v1}[q] = {v}[q] + kick * kv[q]",
+            f"{x1}[q] = {x}[q] + drift * ({v1}[q] if free else R(0))",
+            *(rest if closing == 0.0 else [f"before[q] = {v1}[q]"]),
+        ]
+        kicks = f"kick = {literal(opening, dtype)} * hr"
+        lines += [kicks, f"drift = {literal(drift, dtype)} * hr", *each(loop, w, moves)]
         if closing != 0.0:
             count = f"{solver.passes} if standing > 0 else {passes}" if contacts else f"{passes}"
             lines += [
                 f"kick = {literal(closing, dtype)} * hr",
-                f"for q in {loop}(3 * n):",
-                "    before[q] = v1[q]",
                 f"for _ in range({count}):",
-                f"    status |= DERIV(t + {after!r} * h, x1, v1, kv)",
+                f"    status |= DERIV(t + {after!r} * h, {x1}, {v1}, kv)",
                 f"    for q in {loop}(3 * n):",
-                "        v1[q] = before[q] + kick * kv[q]",
+                f"        {v1}[q] = before[q] + kick * kv[q]",
+                *(each(loop, w, rest) if rest else []),
             ]
             evaluations += passes
-    return StepText(["kv", "before"], lines, evaluations, keeps)
+    return StepText(["kv", "before"], lines, evaluations, keeps, in_place=not contacts)

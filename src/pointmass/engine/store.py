@@ -31,7 +31,7 @@ Printed by pointmass {version} for {dtype}. It runs without Numba too: delete th
 import numpy as np
 from numba import njit, prange
 
-from pointmass.engine.support import exponent, scaled, select, significand
+from pointmass.engine.support import added, columns, exponent, scaled, select, significand, subtracted
 
 R = np.{dtype}
 OWNING = {{"_nrt": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True{fast}}}

@@ -119,3 +119,111 @@ def _compiled_select(condition: Any, a: Any, b: Any) -> Any:
         return _select(condition, a, b)  # type: ignore[call-arg]  # Numba gives the context
 
     return compiled
+
+
+def columns(target: Any, o: Any, width: int, source: Any, rows: Any, q: Any, step: int) -> None:
+    """Turn the first six numbers of eight records of eight into columns.
+
+    Records are those of the rows[q], rows[q + step], ... of `source`. Columns go to `target` at o, o + width, ...
+    """
+    for j in range(8):
+        record = 8 * int(rows[int(q) + j * step])
+        for c in range(6):
+            target[int(o) + c * width + j] = source[record + c]
+
+
+def added(target: Any, o: Any, source: Any, q: Any) -> None:
+    """Add four numbers of `source` at q to those of `target` at o."""
+    target[int(o) : int(o) + 4] += source[int(q) : int(q) + 4]
+
+
+def subtracted(target: Any, o: Any, source: Any, q: Any) -> None:
+    """Subtract four numbers of `source` at q from those of `target` at o."""
+    target[int(o) : int(o) + 4] -= source[int(q) : int(q) + 4]
+
+
+def _vector(context: Any, builder: Any, kind: Any, array: Any, index: Any, count: int) -> tuple[Any, int]:
+    """Where some numbers of an array are, as a vector, and on what multiple of bytes they lie at least."""
+    number = context.get_data_type(kind.dtype)
+    place = builder.gep(context.make_array(kind)(context, builder, array).data, [index])
+    return builder.bitcast(place, ir.VectorType(number, count).as_pointer()), context.get_abi_sizeof(number)
+
+
+def _interleaved(builder: Any, a: Any, b: Any, size: int, high: bool) -> Any:
+    """Groups of `size` numbers from two vectors of eight by turns: every other group, from the first or the second."""
+    low = range(size * high, 8, 2 * size)
+    mask = [8 * other + begin + k for begin in low for other in (0, 1) for k in range(size)]
+    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(ir.IntType(32), 8), mask))
+
+
+@intrinsic
+def _columns(typingctx: Any, target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        target, o, width, source, rows, q, step = arguments
+        kinds = dict(zip(("target", "source", "rows"), (signature.args[k] for k in (0, 3, 4)), strict=True))
+        places = context.make_array(kinds["rows"])(context, builder, rows).data
+        vectors = []
+        for j in range(8):
+            row = builder.load(builder.gep(places, [builder.add(q, builder.mul(step, step.type(j)))]))
+            first = builder.mul(builder.sext(row, q.type), q.type(8))
+            place, align = _vector(context, builder, kinds["source"], source, first, 8)
+            vectors.append(builder.load(place, align=align))
+        for size in (1, 2, 4):  # the halves of blocks of 2 size x 2 size numbers change places
+            other = list(vectors)
+            for a in range(8):
+                if not a & size:
+                    other[a], other[a + size] = (
+                        _interleaved(builder, vectors[a], vectors[a + size], size, high) for high in (False, True)
+                    )
+            vectors = other
+        for c in range(6):
+            at = builder.add(o, builder.mul(width, width.type(c)))
+            place, align = _vector(context, builder, kinds["target"], target, at, 8)
+            builder.store(vectors[c], place, align=align)
+        return context.get_dummy_value()
+
+    number = types.uintp
+    return types.void(target, number, number, source, rows, number, number), build
+
+
+def _sum(operation: str) -> Any:
+    @intrinsic
+    def changed(typingctx: Any, target: Any, o: Any, source: Any, q: Any) -> Any:
+        def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            target, o, source, q = arguments
+            mine, align = _vector(context, builder, signature.args[0], target, o, 4)
+            more, _ = _vector(context, builder, signature.args[2], source, q, 4)
+            result = getattr(builder, operation)(builder.load(mine, align=align), builder.load(more, align=align))
+            builder.store(result, mine, align=align)
+            return context.get_dummy_value()
+
+        return types.void(target, types.uintp, source, types.uintp), build
+
+    return changed
+
+
+_added, _subtracted = _sum("fadd"), _sum("fsub")
+
+
+@overload(columns, inline="always")
+def _compiled_columns(target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
+    def compiled(target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
+        return _columns(target, o, width, source, rows, q, step)  # type: ignore[call-arg]
+
+    return compiled
+
+
+@overload(added, inline="always")
+def _compiled_added(target: Any, o: Any, source: Any, q: Any) -> Any:
+    def compiled(target: Any, o: Any, source: Any, q: Any) -> Any:
+        return _added(target, o, source, q)
+
+    return compiled
+
+
+@overload(subtracted, inline="always")
+def _compiled_subtracted(target: Any, o: Any, source: Any, q: Any) -> Any:
+    def compiled(target: Any, o: Any, source: Any, q: Any) -> Any:
+        return _subtracted(target, o, source, q)
+
+    return compiled
