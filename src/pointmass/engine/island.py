@@ -159,8 +159,8 @@ class IslandKernel:
 
     @property
     def scratch(self) -> list[str]:
-        """Statements that make what a thread needs for an island; M has the largest counts of particles, of elements, of
-        what the blocks of a matrix take, and last that of tiles."""
+        """Statements that make what a thread needs for an island; M has the largest counts of particles, of elements, and
+        of what the blocks of a matrix take, and last that of tiles."""
         contact = self.deriv.contact
         families = enumerate(self.deriv.families)
         lines = [f"B{f.number} = np.empty({3 * f.force.nodes} * M[{k + 1}], R)" for k, f in families if f.implicit]
