@@ -159,7 +159,7 @@ class IslandKernel:
 
     @property
     def scratch(self) -> list[str]:
-        """Statements that make what a thread needs for an island; M has the largest counts of particles, of elements, and
+        """Statements that make what a thread needs for an island; M has the largest counts of particles, of elements,
         of what the blocks of a matrix take, and last that of tiles."""
         contact = self.deriv.contact
         families = enumerate(self.deriv.families)
