@@ -343,13 +343,15 @@ def test_a_solver_may_be_named() -> None:
         pm.Simulation(system, pm.RK4)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("compiled", [False, True])
 @pytest.mark.parametrize("name", ["bdf2", "dopri5"])
-def test_a_run_that_diverged_can_go_on_when_its_cause_is_gone(name):
+def test_a_run_that_diverged_can_go_on_when_its_cause_is_gone(name, compiled):
     """Also if particles were born in the step that failed."""
     p = pm.Particles([[0, 0, 0]])
     blast = pm.Field(("exp(900*t)*1e300", "0", "0"), enabled=False)
     nozzle = pm.Nozzle(rate=70, lifetime=0.2, position=(0, 3, 0))
-    sim = pm.Simulation(pm.ParticleSystem(p, [pm.Gravity(), blast]), name, 1 / 60, emitters=[nozzle])
+    system = pm.ParticleSystem(p, [pm.Gravity(), blast])
+    sim = pm.Simulation(system, name, 1 / 60, emitters=[nozzle], compiled=compiled)
     sim.step(60)
     blast.enabled = True
     with pytest.raises(pm.Diverged):

@@ -44,8 +44,7 @@ def entries(found: Layout) -> list[tuple[int, int, int]]:
 def test_every_block_is_read_once_in_its_row_and_column(relative: bool) -> None:
     pairs = lattice()
     one, two = pairs[: len(pairs) // 2], pairs[len(pairs) // 2 :]
-    place = np.arange(FIRST[-1])
-    found = layout(FIRST, [(incidence(part, place, FIRST), 2) for part in (one, two)], relative)
+    found = layout(FIRST, [(incidence(part, FIRST), 2) for part in (one, two)], relative)
     wanted = []
     count = [0, 0, 0]
     for part in (one, two):

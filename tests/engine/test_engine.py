@@ -354,22 +354,6 @@ def test_lanes_of_single_particles_are_vectors() -> None:
         assert text.count("%ymm") + text.count("%zmm") > 50, name
 
 
-def test_a_failed_span_leaves_what_the_solver_remembers() -> None:
-    """Also if particles were born in it: the memory is for those that are there, not for those that were not kept."""
-    p = pm.Particles([[0, 0, 0]])
-    blast = pm.Field(("exp(900*t)*1e300", "0", "0"), enabled=False)
-    nozzle = pm.Nozzle(rate=70, lifetime=0.2, position=(0, 3, 0))
-    system = pm.ParticleSystem(p, [pm.Gravity(), blast])
-    sim = pm.Simulation(system, "bdf2", 1 / 60, emitters=[nozzle], compiled=True)
-    sim.step(60)
-    blast.enabled = True
-    with pytest.raises(pm.Diverged):
-        sim.step()
-    blast.enabled = False
-    sim.step(60)
-    assert sim.t == 2.0
-
-
 def test_the_last_of_several_steps_can_be_looked_into_afterwards() -> None:
     def made() -> pm.Simulation:
         rng = np.random.default_rng(3)

@@ -82,8 +82,7 @@ def load_scene(source: str, options: RunOptions) -> Scene:
     InvalidInput
         No such scene, a file that is no scene, an option that is not allowed.
     """
-    if options.threads is not None:
-        use_threads(options.threads)
+    use_threads(options.threads)
     if options.dt is not None and options.substeps is not None:
         raise InvalidInput("--dt and --substeps both set the step: give one of them")
     return _with_options(_described(source, _settings(options.settings)), options)

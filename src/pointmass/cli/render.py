@@ -145,8 +145,7 @@ def _from_cache(source: str, options: RunOptions, drawing: Drawing, report: Repo
 
     if options.given():
         raise InvalidInput(f"{options.given()[0]} cannot change the cache {source!r}: render the scene instead")
-    if options.threads is not None:
-        use_threads(options.threads)
+    use_threads(options.threads)
     cache = Cache.open(source)
     if not len(cache):
         raise InvalidInput(f"the cache {source!r} has no frames: run the scene again")

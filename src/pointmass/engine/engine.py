@@ -87,7 +87,7 @@ class Engine:
     farthest: float = 0.0
     _before: tuple[Array, Array] | None = None
     _looked: bool = False  # whether the last step can no longer be looked into
-    _last: Any = None  # span, births, ids and what the solver remembered before it
+    _last: Any = None  # span, births and ids, and what the reference path knew before it
     _kernels: tuple[Any, dict[Any, Any]] = (None, {})
     _groups: tuple[Any, list[Group]] = (None, [])
     _energies: dict[Force, tuple[Any, PairEnergy]] = field(default_factory=dict)
@@ -192,7 +192,7 @@ class Engine:
         look_inside : whether `state_at` will be asked for a time within the last step.
         """
         p = self.system.particles
-        self._last = span, births, p.id, self.reference.recall()
+        self._last = span, births, p.id, self.reference.left()
         if self._before is None or self._before[0].shape != p.x.shape:
             self._before = np.empty_like(p.x), np.empty_like(p.v)
         kernels = [g.members for g in self._grouped(births, span.start) if g.rows is None]
@@ -269,14 +269,14 @@ class Engine:
     def _again_for_a_look(self) -> bool:
         """Make the last span once more, so that its last step can be looked into; False if that leads elsewhere now."""
         p = self.system.particles
-        span, births, ids, memory = self._last
+        span, births, ids, earlier = self._last
         if ids is not p.id:
             return False
         now, left = (p.x.copy(), p.v.copy()), self.reference.left()
         assert self._before is not None
         p.x[:], p.v[:] = self._before
         self.system.t = span.start
-        self.reference.remember(memory, Stats())
+        self.reference.leave(earlier)
         same = self.run(span, births, look_inside=True) and np.array_equal(p.x, now[0]) and np.array_equal(p.v, now[1])
         p.x[:], p.v[:] = now
         self.system.t = span.end

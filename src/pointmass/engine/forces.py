@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pointmass.engine.binding import Binder, Table, Text
 from pointmass.engine.contact import ContactText
 from pointmass.engine.pairs import Pairs
-from pointmass.engine.printing import indented, literal
+from pointmass.engine.printing import function, indented, literal
 from pointmass.engine.reference import surfaces_of
 from pointmass.laws.elements import ElementForce
 from pointmass.laws.pairs import PairForce
@@ -173,9 +173,8 @@ class Deriv:
                 *(f"    records[{RECORD} * i + {c}] = {q}[3 * i + {c % 3}]" for c, q in enumerate("xxxvvv")),
             ]
             if self.parallel:
-                parts.append(
-                    _function("tile_of", f"tile, {self.call}, t, x, v, k", "**FLAGS", [*numbers, "status = 0", *tile])
-                )
+                tile = [*numbers, "status = 0", *tile, "return status"]
+                parts.append(function("tile_of", f"tile, {self.call}, t, x, v, k", "**FLAGS", tile))
                 body += [
                     "worst = 0",
                     "for tile in prange(len(cuts) - 1):",
@@ -184,8 +183,8 @@ class Deriv:
                 ]
             else:
                 body += ["tile = 0", *tile]
-        main = _function("deriv", f"{self.call}, t, x, v, k", self.flags, [*numbers, "status = 0", *body])
-        return "".join([*parts, main]).removesuffix("\n\n")
+        body = [*numbers, "status = 0", *body, "return status"]
+        return "".join([*parts, function("deriv", f"{self.call}, t, x, v, k", self.flags, body)])
 
     def _tile(self, stages: list[list[str]], last: list[str]) -> list[str]:
         """Statements that go through the forces on the particles of a tile."""
@@ -211,7 +210,7 @@ class Deriv:
 
     def _pairs(self, force: PairForce) -> tuple[list[str], list[str]]:
         """Statements that evaluate all pairs, and those that add what they do to a particle."""
-        pairs = Pairs(force, len(self.families) + len(self.pairs), self.binder, self.loop == "prange")
+        pairs = Pairs(force, len(self.families) + len(self.pairs), self.binder, self.parallel)
         self.pairs.append(pairs)
         j, switch = pairs.number, self.binder.switch(force)
         evaluate = [f"# {force.name}", f"if {switch} != 0 and e{j} > s{j}:", f"    status |= {pairs.call()}"]
@@ -293,12 +292,6 @@ class Deriv:
         ]
 
 
-def _function(name: str, arguments: str, flags: str, lines: list[str]) -> str:
-    """A function that returns a status."""
-    head = [f"@njit({flags})", f"def {name}({arguments}):"]
-    return "\n".join([*head, *indented([*lines, "return status"], 1), "", "", ""])
-
-
 def unary(
     binder: Binder, force: UnaryForce, tag: str, state: Mapping[str, str], index: str, time: str = "t"
 ) -> tuple[list[str], list[str]]:
@@ -351,48 +344,6 @@ UNARY = {name: f"{q}[o_{axis}]" for q in "xv" for axis, name in zip("xyz", vecto
 
 
 @dataclass(frozen=True, eq=False)
-class Incidence:
-    """The elements of a family in the order of the kernel's rows.
-
-    Attributes
-    ----------
-    order : of the elements: island by island, and within one by their number, shape (e,).
-    nodes : row of each node within its island, shape (e * k,).
-    start : first element of each island, shape (islands + 1,).
-    ends : start of each row's entries in `entries`, shape (rows + 1,).
-    entries : element within its island times k plus node, for each row by element, shape (e * k,).
-    """
-
-    order: NDArray[np.intp]
-    nodes: NDArray[np.int32]
-    start: NDArray[np.int64]
-    ends: NDArray[np.int64]
-    entries: NDArray[np.int32]
-
-
-def incidence(rows: NDArray[np.intp], place: NDArray[np.intp], first: NDArray[np.int64]) -> Incidence:
-    """Sort the elements of a group of islands.
-
-    Parameters
-    ----------
-    rows : particles of each element, shape (e, k), all of the group.
-    place : row in the kernel of each particle of the system, shape (n,).
-    first : first row of each island, shape (islands + 1,).
-    """
-    places = place[rows]
-    island = np.searchsorted(first, places[:, 0], side="right") - 1
-    order = np.argsort(island, kind="stable")
-    places, island = places[order], island[order]
-    start = np.searchsorted(island, np.arange(len(first)), side="left").astype(np.int64)
-    k = rows.shape[1]
-    own = (np.arange(len(rows)) - start[island])[:, None] * k + np.arange(k)
-    by_row = np.argsort(places.ravel(), kind="stable")
-    ends = np.searchsorted(places.ravel()[by_row], np.arange(first[-1] + 1), side="left").astype(np.int64)
-    local = places - first[island][:, None]
-    return Incidence(order, local.astype(np.int32).ravel(), start, ends, own.ravel()[by_row].astype(np.int32))
-
-
-@dataclass(frozen=True, eq=False)
 class Tiled:
     """The elements of a family tile by tile; one between several tiles is there for each.
 
@@ -428,3 +379,33 @@ def tiled(places: NDArray[np.intp], cuts: NDArray[np.int64], first: NDArray[np.i
     start = np.searchsorted(tile, np.arange(len(cuts)), side="left").astype(np.int64)
     local = places[order] - first[tile][:, None]
     return Tiled(order, local.astype(np.int32).ravel(), start)
+
+
+@dataclass(frozen=True, eq=False)
+class Incidence(Tiled):
+    """The elements of a family island by island, and those of each row.
+
+    Attributes
+    ----------
+    ends : start of each row's entries in `entries`, shape (rows + 1,).
+    entries : element within its island times k plus node, for each row by element, shape (e * k,).
+    """
+
+    ends: NDArray[np.int64]
+    entries: NDArray[np.int32]
+
+
+def incidence(places: NDArray[np.intp], first: NDArray[np.int64]) -> Incidence:
+    """Sort the elements of a group of islands.
+
+    Parameters
+    ----------
+    places : rows of each element, shape (e, k), all of the group.
+    first : first row of each island, shape (islands + 1,).
+    """
+    islands, k = tiled(places, first, first[:-1]), places.shape[1]
+    rows = places[islands.order].ravel()
+    own = np.arange(len(rows)) - k * np.repeat(islands.start[:-1], k * np.diff(islands.start))
+    by_row = np.argsort(rows, kind="stable")
+    ends = np.searchsorted(rows[by_row], np.arange(first[-1] + 1), side="left").astype(np.int64)
+    return Incidence(islands.order, islands.nodes, islands.start, ends, own[by_row].astype(np.int32))

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 from pointmass.engine.blocks import LANES, Kind
 from pointmass.engine.forces import Deriv
-from pointmass.engine.printing import indented, statements
+from pointmass.engine.printing import function, indented, statements
 from pointmass.solvers.implicit import Implicit
 from pointmass.solvers.linear import ConjugateGradients, traced_block_inverse
 from pointmass.tracing.columns import expanded
@@ -65,15 +65,18 @@ class Gradients:
     @property
     def text(self) -> str:
         """The functions."""
-        parts = [self._fold(), self._condense(), self._image(), self._eased(), self._turned(), self._gradients()]
+        parts = [
+            function("folded", "a, lo, count", "**FLAGS", FOLD.splitlines()),
+            self._condense(),
+            self._image(),
+            self._eased(),
+            self._turned(),
+            self._gradients(),
+        ]
         return "".join(parts)
 
     def _function(self, name: str, arguments: str, lines: Sequence[str]) -> str:
-        head = [f"@njit({self.deriv.flags})", f"def {name}({arguments}):"]
-        return "\n".join([*head, *indented(list(lines), 1), "", "", ""])
-
-    def _fold(self) -> str:
-        return "\n".join(["@njit(**FLAGS)", "def folded(a, lo, count):", *indented(FOLD.splitlines(), 1), "", "", ""])
+        return function(name, arguments, self.deriv.flags, lines)
 
     # ------------------------------------------------------------------------------------------------ loops
 
@@ -96,7 +99,7 @@ class Gradients:
 
     def _lanes(self, lines: Sequence[str]) -> list[str]:
         """A loop over the particles i of a block, in lanes c."""
-        return ["for i in range(lo, hi):", "    c = b + np.uintp(i - lo)", *indented(list(lines), 1)]
+        return ["for i in range(lo, hi):", "    c = b + np.uintp(i - lo)", *indented(lines, 1)]
 
     def _slices(self, lines: Sequence[str]) -> list[str]:
         """A loop over the slices of a block, from particle `begin` and lane `first` on."""
@@ -105,12 +108,12 @@ class Gradients:
             f"    begin = {LANES} * piece",
             f"    width = min(n - begin, {LANES})",
             "    first = b + np.uintp(begin - lo)",
-            *indented(list(lines), 1),
+            *indented(lines, 1),
         ]
 
     def _slice(self, lines: Sequence[str]) -> list[str]:
         """A loop over the particles of a slice, in lanes c."""
-        return ["for l in range(width):", "    c = first + np.uintp(l)", *indented(list(lines), 1)]
+        return ["for l in range(width):", "    c = first + np.uintp(l)", *indented(lines, 1)]
 
     def _runs(self, kind: Kind, before: Sequence[str], lane: Sequence[str]) -> list[str]:
         """A loop over the runs of a slice and their lanes; number k of a lane's block is at e + k LANES."""
@@ -118,7 +121,7 @@ class Gradients:
         return [
             f"for run in range({k}_runs[slices + piece], {k}_runs[slices + piece + 1]):",
             f"    blocks = np.uintp({kind.size * LANES} * (run - {k}_runs[slices]))",
-            *indented(list(before), 1),
+            *indented(before, 1),
             *indented(self._slice(["e = blocks + np.uintp(l)", *lane]), 1),
         ]
 
@@ -129,7 +132,7 @@ class Gradients:
             f"for entry in range({k}_ends[g_], {k}_ends[g_ + 1]):",
             f"    e = np.uintp({kind.size}) * np.uintp({k}_block[np.uintp(entry)])",
             f"    other = {k}_other[np.uintp(entry)]",
-            *indented(list(lines), 1),
+            *indented(lines, 1),
         ]
 
     # ------------------------------------------------------------------------------------------------ the matrix

@@ -7,7 +7,7 @@ do to one particle is printed by `contact`.
 from __future__ import annotations
 
 from pointmass.engine.contact import ContactText
-from pointmass.engine.printing import indented
+from pointmass.engine.printing import function, indented
 from pointmass.engine.reference import MOST_EVENTS
 
 WORK = ("x0", "v0", "bx", "px", "pv", "ground", "a1", "a2")  # arrays of an island, each of length 3n
@@ -61,9 +61,8 @@ class Impacts:
             "            standing += 1",
             "return standing, status",
         ]
-        head = [f"@njit({self.flags})", f"def prepare({self.call}, t, x, v, av):"]
-        doc = '    """Find who stands on what, and stop their motion into it; how many do, and a status."""'
-        return "\n".join([*head, doc, *indented(lines, 1), "", "", ""])
+        doc = '"""Find who stands on what, and stop their motion into it; how many do, and a status."""'
+        return function("prepare", f"{self.call}, t, x, v, av", self.flags, [doc, *lines])
 
     def _collide(self) -> str:
         second = self.order == 2
@@ -114,9 +113,8 @@ class Impacts:
             "return now, hits",
         ]
         arguments = "alone, t, h, x, v, events, paid, when, began, " + ", ".join(WORK)
-        head = [f"@njit({self.flags})", f"def collide({self.call}, {arguments}):"]
-        doc = '    """Let everybody respond to what is in the way; the clock to go on from, and how many hit."""'
-        return "\n".join([*head, doc, *indented(lines, 1), "", "", ""])
+        doc = '"""Let everybody respond to what is in the way; the clock to go on from, and how many hit."""'
+        return function("collide", f"{self.call}, {arguments}", self.flags, [doc, *lines])
 
     def _pay(self) -> list[str]:
         """ReferenceEngine._pay: what linked particles gained of the others' pull is taken off their rebound."""

@@ -16,7 +16,7 @@ from pointmass.engine.binding import Text
 from pointmass.engine.blocks import LANES, Kind
 from pointmass.engine.forces import UNARY, Deriv, Elements
 from pointmass.engine.gradients import AXES, BLOCK, SQUARE, UPPER, Gradients, read, sandwich, times
-from pointmass.engine.printing import indented, literal, statements
+from pointmass.engine.printing import function, indented, literal, statements
 from pointmass.engine.steps import StepText
 from pointmass.laws.elements import ConstraintForce, ElementForce
 from pointmass.laws.unary import UnaryForce
@@ -120,9 +120,7 @@ class _Printer:
         return StepText(work, lines, 0, functions=functions, scratch=scratch, memory=memory, kinds=self.kinds)
 
     def _function(self, name: str, arguments: str, lines: Sequence[str]) -> str:
-        return "\n".join(
-            [f"@njit({self.deriv.flags})", f"def {name}({arguments}):", *indented(list(lines), 1), "", "", ""]
-        )
+        return function(name, arguments, self.deriv.flags, lines)
 
     def _largest(self) -> str:
         """Largest size of the first 3n numbers of an array, NaN where one is."""

@@ -22,7 +22,8 @@ from pointmass.engine.forces import LANES, Deriv, Incidence, incidence, tiled
 from pointmass.engine.impacts import WORK, Impacts
 from pointmass.engine.implicit import implicit_text
 from pointmass.engine.pairs import FULL, PairArrays
-from pointmass.engine.printing import indented
+from pointmass.engine.phases import REACHED
+from pointmass.engine.printing import function, indented
 from pointmass.engine.steps import StepText, each, step_text
 from pointmass.engine.threads import spread
 from pointmass.solvers.advance import NEARLY, SET_BACKS, Stats
@@ -37,18 +38,6 @@ NOT_FINITE, NO_STEP = 1, 4  # bits of the status of an island
 
 MEMORY = {"warm": ("rise", 1), "x_before": ("y_before", 0), "v_before": ("y_before", 1)}  # in the solver's words
 CONTROL = ("h_next", "error_old", "rejected")  # what the step control remembers of an island
-REACHED = '''@njit(**FLAGS)
-def reached(x, n):
-    """Largest size of the first 3n numbers; infinite where one is not finite."""
-    most = 0.0
-    for q in range(3 * n):
-        size = abs(x[q])
-        if not size <= most:
-            most = size if size < np.inf else np.inf
-    return most
-
-
-'''
 
 Array = NDArray[np.floating[Any]]
 Rows = NDArray[np.intp]
@@ -116,7 +105,7 @@ class IslandKernel:
         self.deriv = Deriv(system, parallel, solver.implicit, alone, binder)
         self.impacts = self._impacts()
         self.step = self._step_text()
-        self.text = self.functions_text + self._run()
+        self.text = REACHED + self.functions_text + self._run()
 
     def _impacts(self) -> Impacts | None:
         deriv = self.deriv
@@ -178,7 +167,7 @@ class IslandKernel:
     def functions_text(self) -> str:
         """The functions down to `advance`."""
         deriv, control = self.deriv, control_of(self.solver)
-        parts = [REACHED, deriv.text, "\n\n", self._slope(), self.step.functions]
+        parts = [deriv.text, self._slope(), self.step.functions]
         if self.impacts is not None:
             parts.append(self.impacts.text)
         if control is not None:
@@ -195,8 +184,7 @@ class IslandKernel:
                 *each(deriv.loop, self._w, ["kx[q] = v[q] if free else R(0)"]),
                 "return status",
             ]
-        head = [f"@njit({deriv.flags})", f"def slope({deriv.call}, t, x, v, kx, kv):"]
-        return "\n".join([*head, *indented(lines, 1), "", "", ""])
+        return function("slope", f"{deriv.call}, t, x, v, kx, kv", deriv.flags, lines)
 
     def _advance(self) -> str:
         """An island from its clock to the end of a step."""
@@ -262,7 +250,7 @@ class IslandKernel:
             *indented(beyond, 1),
             "return status",
         ]
-        return "\n".join([f"@njit({deriv.once})", f"def advance({self.call}):", *indented(lines, 1), "", "", ""])
+        return function("advance", self.call, deriv.once, lines)
 
     def _begin(self) -> list[str]:
         """At the beginning of a step: nobody has hit anything, and everybody is where the step began."""
@@ -321,7 +309,7 @@ class IslandKernel:
             *indented(anew, 1),
             "    if clock < end and bad == 0:",
             f"        bad = advance({call})",
-            "far, fast = reached(xi, n), reached(vi, n)",
+            "far, fast = reached(xi, 0, 3 * n), reached(vi, 0, 3 * n)",
             f"status[island] = bad if far < np.inf and fast < np.inf else {NOT_FINITE}",
             "reach[island, 0] = far",
             "reach[island, 1] = fast",
@@ -330,9 +318,7 @@ class IslandKernel:
         data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers), *layouts, *tiles.values()])
         grid = ", ".join([*self.memory, "birth, t0, dt, k0, count, lengths, controls, work, status, reach"])
         given = f"lo, hi, first, x, v, {data}, {grid}"
-        made = ", ".join(line.split(" = ")[0] for line in self.scratch)
-        run = ["@njit(**ENTRY)", f"def run({given}, {made}):", "    for island in range(lo, hi):", *indented(island, 2)]
-        return "\n".join([*scratch_text(self.scratch), *run, ""])
+        return entry_text(self.scratch, given, ["for island in range(lo, hi):", *indented(island, 1)])
 
     @property
     def title(self) -> str:
@@ -350,10 +336,12 @@ class IslandKernel:
         return IslandMembers(self, rows, labels)
 
 
-def scratch_text(lines: Sequence[str]) -> list[str]:
-    """A function of plain Python for some statements that make arrays of a size M, one call for each thread."""
-    made = ", ".join(line.split(" = ")[0] for line in lines)
-    return ["def scratch(M):", *indented([*lines, f"return {made},"], 1), "", ""]
+def entry_text(scratch: Sequence[str], given: str, lines: Sequence[str]) -> str:
+    """The kernel `run`, and `scratch` of plain Python, whose arrays it takes besides what is given: a call for each
+    thread, with the sizes M."""
+    made = ", ".join(line.split(" = ")[0] for line in scratch)
+    head = ["def scratch(M):", *indented([*scratch, f"return {made},"], 1), "", "", ""]
+    return "\n".join(head) + function("run", f"{given}, {made}", "**ENTRY", lines).removesuffix("\n\n")
 
 
 class IslandMembers:
@@ -395,7 +383,7 @@ class IslandMembers:
 
     def _family(self, mine: Rows, nodes: Rows) -> tuple[Rows, Incidence]:
         """Elements in the order of the kernel, and where they are."""
-        found = incidence(nodes, self.place, self.first)
+        found = incidence(self.place[nodes], self.first)
         return mine[found.order], found
 
     def _layout(self, kind: Kind) -> Layout:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from pointmass.engine import store
 from pointmass.engine.binding import Binder, Packed, Table
-from pointmass.engine.forces import incidence, unary
+from pointmass.engine.forces import tiled, unary
 from pointmass.engine.island import NOT_FINITE, Array, Outcome, Rows, Span
 from pointmass.engine.phases import REACHED, STATE, entries, phases, regions, simple
 from pointmass.engine.printing import indented
@@ -147,7 +147,7 @@ def topologies(system: ParticleSystem, rows: Rows, labels: Rows) -> list[Topolog
         if isinstance(force, ElementForce) and force.enabled:
             nodes = force.rows(system.particles)
             mine = np.flatnonzero(place[nodes[:, 0]] >= 0)
-            sorted_ = incidence(nodes[mine], place, first)
+            sorted_ = tiled(place[nodes[mine]], first, first[:-1])
             found.append((force, mine[sorted_.order], sorted_.nodes.reshape(-1, force.nodes), sorted_.start))
     alike: dict[Any, list[int]] = {}
     for island in range(len(first) - 1):

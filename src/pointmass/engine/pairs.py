@@ -1,6 +1,6 @@
 """Prints the kernels of forces between pairs of particles: all pairs, or those of a list of neighbours.
 
-Every particle adds up by itself what the others do to it, in an order that depends on no thread.
+What the others do to a particle is added up in an order that depends on no thread.
 """
 
 from __future__ import annotations
@@ -565,22 +565,23 @@ class _Law:
 
     def pair(self, first: dict[str, str], second: dict[str, str], prefix: str) -> tuple[list[str], list[str]]:
         """Statements and outputs for one pair, from expressions of the quantities of both."""
-        sides = {"1": first, "2": second}
-        names = {name: sides[node][q] for name, (node, q) in self.inputs.items() if q in sides[node]} | self.common
-        return statements(self.program, names, f"{self.tag}{prefix}", self.binder.dtype)
+        return statements(self.program, self._names(first, second), f"{self.tag}{prefix}", self.binder.dtype)
 
     def mirrored(
         self, first: dict[str, str], second: dict[str, str], prefix: str
     ) -> tuple[list[str], list[str], list[str]]:
         """Statements for one pair, and the outputs for its first and for its second particle."""
-        sides = {"1": first, "2": second}
-        names = {name: sides[node][q] for name, (node, q) in self.inputs.items() if q in sides[node]} | self.common
         places = {place: name for name, place in self.inputs.items()}
         other = {name: places["21"["12".index(node)], q] for name, (node, q) in self.inputs.items()}
         both = expanded(self.program)
         both.outputs += expanded(self.program, both, other).outputs
-        lines, outputs = statements(both, names, f"{self.tag}{prefix}", self.binder.dtype)
+        lines, outputs = statements(both, self._names(first, second), f"{self.tag}{prefix}", self.binder.dtype)
         return lines, outputs[: self.sums], outputs[self.sums :]
+
+    def _names(self, first: dict[str, str], second: dict[str, str]) -> dict[str, str]:
+        """Expressions of the law's inputs."""
+        sides = {"1": first, "2": second}
+        return {name: sides[node][q] for name, (node, q) in self.inputs.items() if q in sides[node]} | self.common
 
     def result(self, row: str, index: str) -> list[str]:
         """Statements that write the force on the particle of a row, whose sums are sum0, sum1, ..."""

@@ -23,13 +23,15 @@ SIZE = BITS(np.iinfo(BITS).max)  # all bits but the sign
 
 
 @njit(**FLAGS)
-def reached(s, begin, end):
-    """Largest size of some numbers, with whole numbers, so that the loop is one of vectors: the bits of sizes are in
-    their order, and NaN is above all."""
+def reached(s, begin, end, runs=1, apart=0):
+    """Largest size of some numbers, or of several runs of them, with whole numbers, so that the loop is one of vectors:
+    the bits of sizes are in their order, and NaN is above all."""
     bits = s.view(BITS)
     most = BITS(0)
-    for i in range(begin, end):
-        most = max(most, bits[np.uintp(i)] & SIZE)
+    for run in range(runs):
+        o = np.uintp(run * apart)
+        for i in range(begin, end):
+            most = max(most, bits[o + np.uintp(i)] & SIZE)
     return BITS(most).view(R)
 
 

@@ -6,7 +6,7 @@ selects, which vectorise; literals carry the precision of the kernel, so that no
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from pointmass.tracing.columns import INFIX
 from pointmass.tracing.program import Primitive, Program, operands
@@ -74,6 +74,11 @@ def statements(
     return lines, [text[o] for o in program.outputs]
 
 
-def indented(lines: list[str], depth: int) -> list[str]:
+def indented(lines: Sequence[str], depth: int) -> list[str]:
     """Lines at a depth of blocks."""
     return [f"{'    ' * depth}{line}" if line else line for line in lines]
+
+
+def function(name: str, arguments: str, flags: str, lines: Sequence[str]) -> str:
+    """The text of a compiled function, with two empty lines behind."""
+    return "\n".join([f"@njit({flags})", f"def {name}({arguments}):", *indented(lines, 1), "", "", ""])

@@ -18,8 +18,9 @@ from pointmass.engine import store
 from pointmass.engine.binding import Binder, Table, equal_columns
 from pointmass.engine.contact import ClearLines
 from pointmass.engine.forces import unary
-from pointmass.engine.island import NOT_FINITE, IslandKernel, Outcome, Span, scratch_text
-from pointmass.engine.printing import indented, literal
+from pointmass.engine.island import NOT_FINITE, IslandKernel, Outcome, Span, entry_text
+from pointmass.engine.phases import REACHED
+from pointmass.engine.printing import function, indented, literal
 from pointmass.engine.threads import spread
 from pointmass.laws.unary import UnaryForce
 from pointmass.solvers.advance import Stats
@@ -38,24 +39,7 @@ BUNCH = 32  # lanes of which it is asked in one go whether somebody waits
 AXES = "xyz"
 UNROLLED = (4, 1)  # steps that a lane makes in registers
 LONG = 100  # statements of a step that are not unrolled
-TRANSPOSED = f'''BITS = np.int32 if R is np.float32 else np.int64
-SIZE = BITS(np.iinfo(BITS).max)  # all bits but the sign
-
-
-@njit(**FLAGS)
-def reached_by(s, offset, m):
-    """Largest size of three runs of lanes. As whole numbers, the bits of a size are in the order of the sizes, and NaN
-    is above all: so the loop is one of vectors."""
-    bits = s.view(BITS)
-    most = BITS(0)
-    for c in range(3):
-        o = np.uintp(offset + {W} * c)
-        for j in range(m):
-            most = max(most, bits[o + np.uintp(j)] & SIZE)
-    return BITS(most).view(R)
-
-
-@njit(**FLAGS)
+TRANSPOSED = f'''@njit(**FLAGS)
 def load(s, offset, x, lo, m):
     """Rows of x, (x, y, z) each, to three runs of lanes."""
     o = np.uintp(offset)
@@ -245,10 +229,10 @@ class SinglesKernel:
         step += [f"{q}_{a} = {motion._free(f'{q}1_{a}')}" for q, a in self.state if q == "v"]
         timed = motion.timed or (clear is not None and bool(clear.step))
         unrolled = [u for u in UNROLLED if u == 1 or not (timed or len(step) > LONG)]
-        lanes = [line for u in unrolled for line in self._lanes(u, step, clear)]
+        lanes = [self._lanes(u, step, clear) for u in unrolled]
         first = motion.binder.functions if island is None else island.functions_text
         one = [] if island is None else [WAITS, *self._one_lane(step, clear)]
-        return "\n".join([first, "", TRANSPOSED, *lanes, *one, *self._run(unrolled), ""])
+        return "".join([REACHED, first, TRANSPOSED, *lanes, *one, self._run(unrolled)])
 
     def _clear(self) -> ClearLines | None:
         contact = None if self.island is None else self.island.deriv.contact
@@ -262,34 +246,18 @@ class SinglesKernel:
                 lines.append(f"{b}{end} = {f'{q}{tail}_{a}' if (q, a) in self.state else 'R(0)'}")
         return lines
 
-    def _lanes(self, unrolled: int, step: list[str], clear: ClearLines | None) -> list[str]:
+    def _lanes(self, unrolled: int, step: list[str], clear: ClearLines | None) -> str:
         """The function that makes a few steps of all lanes, with the state in registers in between."""
-        times = [f"t{j}" for j in range(unrolled + 1)]
-        body = self._lane(unrolled, step, clear)
-        return [
-            "@njit(**FLAGS)",
-            f"def lanes{unrolled}({', '.join([*self.shared, *times])}):",
-            *indented(self._head(unrolled, clear), 1),
-            f"    for j in range({W}):",
-            f"        {LANE} = np.uintp(j)",
-            *indented(body, 2),
-            "    return status",
-            "",
-            "",
-        ]
+        arguments = ", ".join([*self.shared, *(f"t{j}" for j in range(unrolled + 1))])
+        loop = [f"for j in range({W}):", *indented([f"{LANE} = np.uintp(j)", *self._lane(unrolled, step, clear)], 1)]
+        lines = [*self._head(unrolled, clear), *loop, "return status"]
+        return function(f"lanes{unrolled}", arguments, "**FLAGS", lines)
 
-    def _one_lane(self, step: list[str], clear: ClearLines | None) -> list[str]:
+    def _one_lane(self, step: list[str], clear: ClearLines | None) -> str:
         """The function that makes one step of one lane, and says whether that was clear."""
-        body = self._lane(1, step, clear)
-        return [
-            "@njit(forceinline=True, **FLAGS)",
-            f"def lane({LANE}, {', '.join([*self.shared, 't0', 't1'])}):",
-            *indented(self._head(1, clear), 1),
-            *indented(body, 1),
-            "    return not waits and status == 0",
-            "",
-            "",
-        ]
+        lines = [*self._head(1, clear), *self._lane(1, step, clear), "return not waits and status == 0"]
+        arguments = ", ".join([LANE, *self.shared, "t0", "t1"])
+        return function("lane", arguments, "forceinline=True, **FLAGS", lines)
 
     def _head(self, unrolled: int, clear: ClearLines | None) -> list[str]:
         """What all lanes have in common."""
@@ -358,7 +326,7 @@ class SinglesKernel:
             f"        {waiting} = R(0)",
         ]
 
-    def _run(self, unrolled: list[int]) -> list[str]:
+    def _run(self, unrolled: list[int]) -> str:
         """The kernel itself: tiles of particles over a span."""
         motion, island, order = self.motion, self.island, self.system.order
         columns = len(motion.binder.particle.getters)
@@ -389,7 +357,6 @@ class SinglesKernel:
         arrays = [*motion.binder.arrays, *(["F"] if self.system.colliders else [])]
         given = f"first, last, x, v, x_kept, v_kept, {', '.join(arrays)}, birth, t0, dt, k0, count, status, reach"
         made = [f"s = np.ones({(STATE + columns) * W}, R)", *prepared]
-        names = ", ".join(line.split(" = ")[0] for line in made)
         own = [f"    s[{(STATE + c) * W} + i] = C[{c}, lo + i]" for c in range(columns)]
         tile = [
             f"lo = tile * {W}",
@@ -402,19 +369,12 @@ class SinglesKernel:
             "bad = 0",
             "k = k0",
             *steps,
-            *(f"reach[tile, {k}] = reached_by(s, {offset}, m)" for k, (_, offset) in enumerate(copies)),
+            *(f"reach[tile, {k}] = reached(s, {offset}, {offset} + m, 3, {W})" for k, (_, offset) in enumerate(copies)),
             "far = max(reach[tile, 0], reach[tile, 1])",
             f"status[tile] = bad if far < np.inf else {NOT_FINITE}",
             *(f"keep(s, {offset}, {q}, lo, m)" for q, offset in copies),
         ]
-        return [
-            *scratch_text(made),
-            "@njit(**ENTRY)",
-            f"def run({given}, {names}):",
-            "    for tile in range(first, last):",
-            *indented(tile, 2),
-            "",
-        ]
+        return entry_text(made, given, ["for tile in range(first, last):", *indented(tile, 1)])
 
     @property
     def shared(self) -> list[str]:

@@ -32,8 +32,8 @@ def spread(work: Callable[[int, int], object], count: int, grain: int) -> None:
         done.result()
 
 
-def use_threads(threads: int) -> None:
-    """Let kernels run on so many threads, whatever the environment asks for.
+def use_threads(threads: int | None) -> None:
+    """Let kernels run on so many threads, whatever the environment asks for; None = as it does.
 
     Raises
     ------
@@ -41,7 +41,8 @@ def use_threads(threads: int) -> None:
         Not a whole number of at least 1.
     """
     heed_environment()
-    _use(whole_number("threads", threads, at_least=1))
+    if threads is not None:
+        _use(whole_number("threads", threads, at_least=1))
 
 
 @cache

@@ -338,18 +338,6 @@ def _ball_glow(c, box, area, room, ramp, camera):
 
 
 @inner
-def _ball(c, box, area, solid, glows, tile, count, space):
-    camera, offsets, _, ramp = space
-    if solid:
-        return _ball_solid(c, box, area, tile, count, camera, offsets)
-    if not glows:
-        return _ball_soft(c, box, area, tile, count, camera)
-    for k in range(tile[4]):
-        _ball_glow(c, box, area, tile[0][k * BLOCK :], ramp, camera)
-    return count
-
-
-@inner
 def _across(c, dx, dy, inverse, px, py):
     """Where a pixel coordinate lies on a capsule: along it (0 to 1), and the square of how far off its axis.
 
@@ -508,16 +496,28 @@ def _capsule_glow(c, box, area, room, ramp, camera):
             line[BLUE + i] += f * (b + t * more_b)
 
 
-@inner
-def _capsule(c, box, area, solid, glows, tile, count, space):
-    camera, offsets, _, ramp = space
-    if solid:
-        return _capsule_solid(c, box, area, tile, count, camera, offsets)
-    if not glows:
-        return _capsule_soft(c, box, area, tile, count, camera)
-    for k in range(tile[4]):
-        _capsule_glow(c, box, area, tile[0][k * BLOCK :], ramp, camera)
-    return count
+def _round(draw_solid, draw_soft, draw_glow):
+    """What draws a ball or a capsule, by the three ways to draw its kind.
+
+    It is made here, and not handed three functions when it is called: then no caller could be kept on disk.
+    """
+
+    @inner
+    def draw(c, box, area, solid, glows, tile, count, space):
+        camera, offsets, _, ramp = space
+        if solid:
+            return draw_solid(c, box, area, tile, count, camera, offsets)
+        if not glows:
+            return draw_soft(c, box, area, tile, count, camera)
+        for k in range(tile[4]):
+            draw_glow(c, box, area, tile[0][k * BLOCK :], ramp, camera)
+        return count
+
+    return draw
+
+
+_ball = _round(_ball_solid, _ball_soft, _ball_glow)
+_capsule = _round(_capsule_solid, _capsule_soft, _capsule_glow)
 
 
 @inner
