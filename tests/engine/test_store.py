@@ -52,6 +52,29 @@ def test_processes_at_once_do_not_disturb_each_other(folder: Path) -> None:
     assert [p.suffix for p in (folder / "kernels").iterdir() if p.is_file()] == [".py"]
 
 
+@pytest.mark.parametrize("enabled", [True, False])
+def test_garbage_waits_while_a_kernel_compiles(folder: Path, enabled: bool) -> None:
+    """The collector stands still meanwhile, and is as it was before afterwards."""
+    code = f"""
+import gc
+from numba.core.event import Listener, install_listener
+from pointmass.engine import store
+if not {enabled}:
+    gc.disable()
+text = "@njit(**FLAGS)\\ndef twice(x):\\n    return 2 * x\\n\\n@njit(**ENTRY)\\ndef run(x):\\n    return twice(x)\\n"
+store.load("t", text, "float64")
+seen = []
+class Look(Listener):
+    def on_start(self, event): seen.append(gc.isenabled())
+    def on_end(self, event): pass
+with install_listener("numba:compile", Look()):
+    assert store.LOADED.popitem()[1].run(1.0) == 2
+print(seen, gc.isenabled())
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split("\n")[0] == f"[False, False] {enabled}"
+
+
 def test_what_it_depends_on_is_in_the_name(folder: Path) -> None:
     modules = [store.load(*text) for text in [("t", TEXT, "float64"), ("t", TEXT, "float32"), ("u", TEXT, "float64")]]
     assert len({m.__name__ for m in modules}) == 3

@@ -153,8 +153,9 @@ def bear(P, C, o, t, x, y, z, vx, vy, vz, m, fx, fy, fz):
             bx, by, bz = push_of(P, k, t)
             C[r + CARRIED], C[r + CARRIED + 1], C[r + CARRIED + 2] = m * bx, m * by, m * bz
             C[r + BEND] = m * bending_of(P, k, lx, ly, lz, vx - gx, vy - gy, vz - gz)
-    if count == 1:
-        fx, fy, fz, _ = bear_one(P, C, o + 1, True, fx, fy, fz)
+    alone = count == 1
+    if alone:
+        fx, fy, fz, _ = bear_one(P, C, o + 1, alone, fx, fy, fz)
         return fx, fy, fz
     for friction in (False, True):
         for _ in range(PASSES):

@@ -7,6 +7,7 @@ may read.
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import sys
@@ -73,6 +74,7 @@ def load(title: str, text: str, dtype: str) -> ModuleType:
     dtype : "float64" or "float32".
     """
     heed_environment()
+    _spare_the_collector()
     source = complete(title, text, dtype)
     key = sha256((source + _surroundings()).encode()).hexdigest()[:20]
     with LOCK:
@@ -106,6 +108,32 @@ def clear() -> tuple[int, int]:
         kernels += path.suffix == ".py"
         path.unlink(missing_ok=True)
     return kernels, size
+
+
+@cache
+def _spare_the_collector() -> None:
+    """Let no garbage be collected while Numba compiles: the search through its many objects takes 8% of the time."""
+    from numba.core.event import Listener, register
+
+    class Compiling(Listener):
+        """Functions that are being compiled, one within the other, by any thread."""
+
+        depth, lock, enabled = 0, threading.Lock(), True
+
+        def on_start(self, event: Any) -> None:
+            with self.lock:
+                if self.depth == 0:
+                    self.enabled = gc.isenabled()
+                    gc.disable()
+                self.depth += 1
+
+        def on_end(self, event: Any) -> None:
+            with self.lock:
+                self.depth -= 1
+                if self.depth == 0 and self.enabled:
+                    gc.enable()
+
+    register("numba:compile", Compiling())  # type: ignore[no-untyped-call]
 
 
 @cache
