@@ -55,6 +55,25 @@ def test_scene_passes_its_check_at_full_length(name: str) -> None:
     shipped.check(frames_of(scene, scene.frames))
 
 
+PRESETS = [(name, preset) for name, shipped in SCENES.items() for preset in shipped.presets]
+
+
+@pytest.mark.parametrize(("name", "preset"), PRESETS)
+def test_a_preset_passes_the_check(name: str, preset: str) -> None:
+    shipped = SCENES[name].with_settings(SMALL.get(name, {}), preset)
+    shipped.check(frames_of(shipped.build(), 10))
+    assert SCENES[name].with_settings({}, preset) != made(name, {})
+
+
+def test_every_scene_has_presets() -> None:
+    assert all(len(shipped.presets) >= 3 for shipped in SCENES.values())
+    with pytest.raises(InvalidInput, match=r"unknown preset of scene fountain: 'geysir': did you mean 'geyser'"):
+        SCENES["fountain"].with_settings({}, "geysir")
+    assert SCENES["fountain"].with_settings({"speed": 3}, "geyser") == made(
+        "fountain", {**SCENES["fountain"].presets["geyser"], "speed": 3}
+    )
+
+
 QUICK = {"flow": {"particles": 20, "arrows": 0, "streamlines": 0}, "springs": {"side": 3}, "bounce": {"balls": 10}}
 COSTLY = {"balls", "rate", "links", "side", "particles", "mass", "stiffness", "steps_per_second"}  # only so many steps
 ENDS = [

@@ -44,7 +44,10 @@ def command(name: str | None, as_json: bool) -> None:
 def _scenes() -> list[Entry]:
     from pointmass.scenes import SCENES
 
-    return [{"name": n, "summary": s.summary(), "parameters": s.parameters()} for n, s in SCENES.items()]
+    return [
+        {"name": n, "summary": s.summary(), "parameters": s.parameters(), "presets": s.presets}
+        for n, s in SCENES.items()
+    ]
 
 
 def _named(name: str) -> list[Entry]:
@@ -97,7 +100,7 @@ def _print_all(console: Any, scenes: list[Entry]) -> None:
     from pointmass.schema import LISTS
     from pointmass.solvers import ALIASES, SOLVERS
 
-    console.print("[bold]Scenes[/], with the parameters that --set changes")
+    console.print("[bold]Scenes[/], with the parameters that --set changes, and presets for --preset")
     for scene in scenes:
         console.print(f"\n[bold cyan]{scene['name']}[/]  {_plain(scene['summary'])}")
         _print_rows(console, _scene_rows(scene))
@@ -123,6 +126,8 @@ def _scene_rows(scene: Entry) -> Iterator[tuple[str, str, str]]:
     for parameter in scene["parameters"]:
         default = f"{parameter['default']} {parameter['unit']}".strip()
         yield parameter["name"], default, parameter["summary"] + _range(parameter)
+    for name, settings in scene["presets"].items():
+        yield f"--preset {name}", "", ", ".join(f"{key}={value}" for key, value in settings.items())
 
 
 def _type_rows(entry: Entry) -> Iterator[tuple[str, str, str]]:

@@ -23,6 +23,9 @@ quiet = click.option("--quiet", "-q", is_flag=True, help="Say nothing but errors
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")
 
 
+OPTIONS = ("frames", "fps", "dt", "substeps", "solver", "seed", "dtype", "preset")  # that change a simulation
+
+
 @dataclass(frozen=True, kw_only=True)
 class RunOptions:
     """What a command line says about a run; None = as the scene says.
@@ -40,12 +43,13 @@ class RunOptions:
     solver: str | None = None
     seed: int | None = None
     dtype: str | None = None
+    preset: str | None = None
     threads: int | None = None
     settings: tuple[str, ...] = ()
 
     def given(self) -> list[str]:
         """The options that change a simulation."""
-        values = {name: getattr(self, name) for name in ("frames", "fps", "dt", "substeps", "solver", "seed", "dtype")}
+        values = {name: getattr(self, name) for name in OPTIONS}
         return [f"--{name}" for name, value in values.items() if value is not None] + ["--set"] * bool(self.settings)
 
 
@@ -60,6 +64,7 @@ def run_options(command: Command) -> Command:
             click.option("--solver", help="Such as rk4; see pointmass list."),
             click.option("--seed", type=int, help="Seed of all chance while it runs."),
             click.option("--dtype", help="float64 or float32."),
+            click.option("--preset", help="Of a shipped scene, such as geyser of fountain; see pointmass list."),
             click.option("--threads", type=int, envvar="POINTMASS_THREADS", help="Threads; the result is the same."),
             click.option(
                 "--set",
@@ -85,7 +90,7 @@ def load_scene(source: str, options: RunOptions) -> Scene:
     use_threads(options.threads)
     if options.dt is not None and options.substeps is not None:
         raise InvalidInput("--dt and --substeps both set the step: give one of them")
-    return _with_options(_described(source, _settings(options.settings)), options)
+    return _with_options(_described(source, _settings(options.settings), options.preset), options)
 
 
 def default_output(source: str, suffix: str) -> Path:
@@ -101,16 +106,20 @@ def parse_size(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
-def _described(source: str, settings: dict[str, Any]) -> Scene:
+def _described(source: str, settings: dict[str, Any], preset: str | None) -> Scene:
     path = Path(source)
     if path.suffix == ".toml" or path.is_file():
+        if preset is not None:
+            raise InvalidInput(
+                f"--preset {preset!r} is not allowed: only scenes that are shipped have presets, not files"
+            )
         from pointmass.scene import Scene
 
         return Scene.load(path, settings)
     from pointmass.scenes import SCENES
 
     if source in SCENES:
-        return SCENES[source].with_settings(settings).build()
+        return SCENES[source].with_settings(settings, preset).build()
     if path.is_dir():
         raise InvalidInput(f"{source!r} is a folder, not a scene: give a TOML file or one of {', '.join(SCENES)}")
     raise unknown("scene", source, SCENES)

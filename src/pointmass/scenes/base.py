@@ -41,6 +41,10 @@ def knob(
 class ShippedScene(ABC):
     """One phenomenon. A leaf is a frozen dataclass of `knob`s; its docstring's first line says what one sees.
 
+    Attributes
+    ----------
+    presets : settings of the knobs that belong together, by name.
+
     Raises
     ------
     InvalidInput
@@ -48,6 +52,7 @@ class ShippedScene(ABC):
     """
 
     name: ClassVar[str]
+    presets: ClassVar[dict[str, dict[str, Any]]] = {}
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -89,8 +94,12 @@ class ShippedScene(ABC):
         ]
 
     @classmethod
-    def with_settings(cls, settings: Mapping[str, Any]) -> ShippedScene:
-        """The scene with some parameters set, given as numbers or as text from a command line."""
+    def with_settings(cls, settings: Mapping[str, Any], preset: str | None = None) -> ShippedScene:
+        """The scene with some parameters set, given as numbers or as text from a command line, over a preset."""
+        if preset is not None:
+            if preset not in cls.presets:
+                raise unknown(f"preset of scene {cls.name}:", preset, cls.presets)
+            settings = {**cls.presets[preset], **settings}
         known = {f.name for f in fields(cls)}
         for name in settings:
             if name not in known:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -22,6 +23,11 @@ class Bounce(ShippedScene):
     """Balls of many sizes fall on an incline and a floor, bounce, slide and come to rest."""
 
     name = "bounce"
+    presets: ClassVar[dict[str, dict[str, Any]]] = {
+        "marbles": {"balls": 400, "radius": 0.03, "radius_range": 0.01, "restitution": 0.6, "friction": 0.1},
+        "moon": {"gravity": 1.62, "air": 0.0, "restitution": 0.85},
+        "ice": {"friction": 0.0, "restitution": 0.3, "slope": 12.0},
+    }
 
     balls: int = knob(60, "how many balls", low=1, high=100000)
     radius: float = knob(0.07, "mean radius of a ball", unit="m", low=0.001, high=10)

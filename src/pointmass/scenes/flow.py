@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -22,6 +23,11 @@ class FlowScene(ShippedScene):
     """Two colours of dye are stirred by a pair of vortices that sway: x' = g(x, t), with arrows and integral curves."""
 
     name = "flow"
+    presets: ClassVar[dict[str, dict[str, Any]]] = {
+        "steady": {"sway": 0.0},
+        "storm": {"speed": 2.0, "sway": 0.4, "period": 2.5},
+        "ink": {"particles": 40000, "arrows": 0, "streamlines": 0},
+    }
 
     particles: int = knob(3200, "how many particles, about", low=10, high=1000000)
     speed: float = knob(0.6, "highest speed of the flow", unit="m/s", low=0.001, high=100)

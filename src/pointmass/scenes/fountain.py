@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from pointmass.collisions import Plane
 from pointmass.emitters import Nozzle
@@ -23,6 +24,11 @@ class Fountain(ShippedScene):
     """Drops of light shoot up in a cone, lean in the wind, and splash on the ground."""
 
     name = "fountain"
+    presets: ClassVar[dict[str, dict[str, Any]]] = {
+        "geyser": {"rate": 4000.0, "speed": 14.0, "speed_range": 4.0, "cone": 4.0, "lifetime": 3.4, "wind": 2.0},
+        "drizzle": {"rate": 250.0, "speed": 4.5, "speed_range": 1.5, "cone": 35.0, "lifetime": 1.4, "wind": 0.3},
+        "storm": {"wind": 9.0, "drag": 0.6, "rate": 1500.0, "restitution": 0.15},
+    }
 
     rate: float = knob(700.0, "drops per second", unit="1/s", low=1, high=1e6)
     speed: float = knob(6.5, "speed at the nozzle", unit="m/s", low=0.1, high=1000)

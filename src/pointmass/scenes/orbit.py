@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -27,6 +28,11 @@ class Orbit(ShippedScene):
     """Three equal stars chase each other along a figure eight, or planets draw Kepler's ellipses."""
 
     name = "orbit"
+    presets: ClassVar[dict[str, dict[str, Any]]] = {
+        "planets": {"kind": "kepler"},
+        "crowd": {"kind": "kepler", "planets": 80, "trail": 1.0},
+        "ribbon": {"trail": 6.0},
+    }
 
     kind: str = knob("figure_eight", "which orbits", choices=("figure_eight", "kepler"))
     planets: int = knob(7, "planets of kepler", low=1, high=200)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -22,6 +23,11 @@ class Pendulum(ShippedScene):
     """A chain of masses swings from a nail, and folds over itself."""
 
     name = "pendulum"
+    presets: ClassVar[dict[str, dict[str, Any]]] = {
+        "simple": {"links": 1, "angle": 30.0},
+        "whip": {"links": 60, "angle": 170.0},
+        "syrup": {"drag": 0.06, "angle": 90.0},
+    }
 
     links: int = knob(12, "links of the chain", low=1, high=400)
     length: float = knob(1.5, "length of the chain", unit="m", low=0.01, high=100)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,6 +27,11 @@ class SpringsScene(ShippedScene):
     """A cube of masses and springs drops on a corner, bounces and wobbles to rest."""
 
     name = "springs"
+    presets: ClassVar[dict[str, dict[str, Any]]] = {
+        "jelly": {"side": 6, "stiffness": 60.0, "damping_ratio": 0.08},
+        "rubber": {"stiffness": 800.0, "restitution": 0.8, "height": 1.5},
+        "moon": {"gravity": 1.62, "height": 1.5, "drag": 0.0},
+    }
 
     side: int = knob(5, "particles along each edge", low=2, high=40)
     size: float = knob(1.0, "edge of the cube", unit="m", low=0.01, high=100)
