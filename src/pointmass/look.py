@@ -9,22 +9,22 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pointmass import over_life, random
 from pointmass.collisions.collider import Collider
 from pointmass.collisions.plane import Plane
+from pointmass.colors import PALETTES, Color, blackbody, linear, palette
 from pointmass.errors import InvalidInput, finite_array, number, unknown, whole_number
 from pointmass.forces.springs import Springs
 from pointmass.frame import Arrows, Curves, Drawable, Points, Segments, Triangles
 from pointmass.laws.unary import VelocityField
+from pointmass.over_life import Curve, Gradient
 from pointmass.particles import Array, Particles
 from pointmass.solvers import FunctionSystem, Midpoint
 from pointmass.system import ParticleSystem
 
-PALETTES = {  # sRGB anchors from low to high
-    "fire": ("#3b0f5c", "#a01a58", "#e8452c", "#ffa62b", "#fff3b0"),
-    "ice": ("#0b2545", "#13518f", "#2f9fd0", "#8fe0f0", "#f4ffff"),
-    "spectrum": ("#5465ff", "#2ec4b6", "#9be15d", "#ffd23f", "#ff5d5d"),
-    "aurora": ("#16324f", "#18a999", "#7ae582", "#f6f740", "#ff6f91"),
-}
+KINDS = ("solid", "glow", "smoke", "flakes", "none")  # of particles
+OWN_COLOR = ("red", "green", "blue")  # attributes: linear light
+SMALLEST_FLAKE, LARGEST_FLAKE = 0.5, 1.5  # times the size
 CURVE_STEPS = 60
 FAMILY_COLORS = {"stretch": "#5fa8ff", "shear": "#5fe3a1", "bend": "#ff6b6b", "volume": "#ff6b6b"}  # as on the slide
 
@@ -35,13 +35,24 @@ class Look:
 
     Attributes
     ----------
-    particles : "solid": shaded balls; "glow": points of light; "none".
+    particles : "solid": shaded balls; "glow": points of light; "smoke": soft puffs that shade each other; "flakes":
+        matt flakes of many sizes and directions; "none".
     size : radius at which particles are drawn [m]; None = their own radius, or 1% of the scene if they have none.
-    color : of particles, a name or "#rrggbb".
-    color_by : "speed", "age", "id" or a particle attribute: colours from the palette instead.
+    color : of particles, a name, "#rrggbb", or the temperature [K] at which a body glows in this colour. Particles with
+        attributes red, green and blue (linear light) have their own.
+    color_by : "speed", "age", "id" or a particle attribute: colours from the palette instead; "temperature": that of
+        each particle's attribute temperature [K].
     color_range : values at both ends of the palette; None = those of the frame.
     palette : fire, ice, spectrum or aurora.
-    brightness : factor on the light of glowing particles.
+    brightness : factor on the light of particles.
+    opacity : of particles, from 0 to 1; of a puff of smoke in its middle.
+    size_over_life, brightness_over_life, opacity_over_life : factors on these over the life of a particle, as pairs of
+        a fraction of its lifetime and a value, straight in between: [[0, 1], [0.8, 1], [1, 0]]; or grow, fade, last,
+        swell, flare. A particle that never dies stays at the first value.
+    color_over_life : pairs of a fraction of the lifetime and a colour or temperature [K], or cooling, or the name of a
+        palette: colours instead of `color`, on which `color_by` and particles' own colours are factors.
+    shutter : exposure time [s]: a glowing particle is a streak as long as the way that it went meanwhile, and as much
+        dimmer; 0 = none. Films have half the time between two frames.
     springs : whether springs are drawn, as lines of `spring_width` [m] (None = 0.3% of the scene) and `spring_color`
         (None = by family).
     trails : length of the particles' trails [s], 0 = none.
@@ -54,27 +65,33 @@ class Look:
         far as one can see.
     """
 
-    particles: Literal["solid", "glow", "none"] = "solid"
+    particles: Literal["solid", "glow", "smoke", "flakes", "none"] = "solid"
     size: float | None = None
-    color: str = "#ffb454"
+    color: Color = "#ffb454"
     color_by: str | None = None
     color_range: tuple[float, float] | None = None
     palette: str = "fire"
     brightness: float = 1.0
+    opacity: float = 1.0
+    size_over_life: Curve | None = None
+    brightness_over_life: Curve | None = None
+    opacity_over_life: Curve | None = None
+    color_over_life: Gradient | None = None
+    shutter: float = 0.0
     springs: bool = True
     spring_width: float | None = None
-    spring_color: str | None = None
+    spring_color: Color | None = None
     trails: float = 0.0
     arrows: int = 0
     streamlines: int = 0
     field_box: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
     colliders: bool = True
-    collider_color: str = "#5b6678"
+    collider_color: Color = "#5b6678"
     floor_size: float | None = None
 
     def __post_init__(self) -> None:
-        if self.particles not in ("solid", "glow", "none"):
-            raise InvalidInput(f"look.particles = {self.particles!r} is not allowed: it must be solid, glow or none")
+        if self.particles not in KINDS:
+            raise InvalidInput(f"look.particles = {self.particles!r} is not allowed: it must be {', '.join(KINDS)}")
         if self.palette not in PALETTES:
             raise unknown("palette", self.palette, PALETTES)
         for color in (self.color, self.collider_color, self.spring_color):
@@ -84,6 +101,14 @@ class Look:
             if getattr(self, name) is not None:
                 number(f"look.{name}", getattr(self, name), above=0, unit="m")
         number("look.brightness", self.brightness, at_least=0)
+        number("look.opacity", self.opacity, at_least=0, at_most=1)
+        number("look.shutter", self.shutter, at_least=0, unit="s")
+        for name, most in (("size_over_life", None), ("brightness_over_life", None), ("opacity_over_life", 1.0)):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, over_life.as_curve(f"look.{name}", getattr(self, name), most))
+        if self.color_over_life is not None:
+            gradient = over_life.as_gradient("look.color_over_life", self.color_over_life)
+            object.__setattr__(self, "color_over_life", gradient)
         number("look.trails", self.trails, at_least=0, unit="s")
         if self.field_box is not None:
             finite_array("look.field_box", self.field_box, (2, 3))
@@ -99,7 +124,9 @@ class Look:
     ) -> tuple[Drawable, ...]:
         """Everything that a frame shows, for the system at (t, x, v)."""
         extent = stage.extent
-        colors = self._colors(system, x, v)
+        age = np.maximum(system.particles.age - (system.t - t), 0)
+        life = np.minimum(age / system.particles.lifetime, 1)
+        colors = self._colors(system, v, life)
         result: list[Drawable] = []
         if self.colliders:
             result += [self._collider(c, k, t, extent, frame) for k, c in enumerate(system.colliders)]
@@ -110,27 +137,71 @@ class Look:
         if self.trails > 0:
             result += stage.trails.drawn(self, system.particles.id, colors, extent, frame)
         if self.particles != "none" and len(x):
-            own = system.particles.radius
-            radius = self.size or np.where(own > 0, own, 0.01 * extent).astype(np.float32)
-            result.append(
-                Points(name="particles", version=frame, radius=radius, color=colors, glow=self.particles == "glow")
-            )
+            result.append(self._particles(system, v, age, life, colors, extent, frame))
         return tuple(result)
 
-    def _colors(self, system: ParticleSystem, x: Array, v: Array) -> Array:
-        n = len(x)
-        if self.color_by is None:
-            return np.tile(linear(self.color, self.brightness), (n, 1))
+    def _particles(
+        self, system: ParticleSystem, v: Array, age: Array, life: Array, colors: Array, extent: float, frame: int
+    ) -> Points:
         p = system.particles
+        radius: Any = self.size or np.where(p.radius > 0, p.radius, 0.01 * extent).astype(np.float32)
+        if self.size_over_life is not None:
+            radius = (radius * over_life.values(self.size_over_life, life)).astype(np.float32)
+        motion = normals = None
+        if self.shutter > 0:
+            # Who was born while the shutter was open shines for a part of the time only.
+            exposed = np.minimum(age, self.shutter)
+            motion = (v * exposed[:, None]).astype(np.float32)
+            colors[:, 3] *= exposed / self.shutter
+        if self.particles == "flakes":
+            size = random.uniform(0, "flakes", p.id, "size")[:, 0]
+            radius = (radius * (SMALLEST_FLAKE + (LARGEST_FLAKE - SMALLEST_FLAKE) * size)).astype(np.float32)
+            normals = random.direction(0, "flakes", p.id, "direction").astype(np.float32)
+        return Points(
+            name="particles",
+            version=frame,
+            radius=radius,
+            color=colors,
+            glow=self.particles == "glow",
+            soft=self.particles == "smoke",
+            motion=motion,
+            normals=normals,
+        )
+
+    def _colors(self, system: ParticleSystem, v: Array, life: Array) -> NDArray[np.float32]:
+        """Linear RGBA of each particle."""
+        n = len(life)
+        p = system.particles
+        light: Any = 1.0
+        if self.color_by == "temperature":
+            light = blackbody(p.column("temperature"))
+        elif self.color_by is not None:
+            light = palette(self.palette, self._levels(p, v))[:, :3]
+        elif all(name in p.attributes for name in OWN_COLOR):
+            light = np.stack([p.attributes[name] for name in OWN_COLOR], axis=1)
+        elif self.color_over_life is None:
+            light = linear(self.color)[:3]
+        if self.color_over_life is not None:
+            light = light * over_life.colors(self.color_over_life, life)
+        result = np.empty((n, 4), np.float32)
+        result[:, :3], result[:, 3] = self.brightness * light, self.opacity
+        if self.brightness_over_life is not None:
+            result[:, :3] *= over_life.values(self.brightness_over_life, life)[:, None]
+        if self.opacity_over_life is not None:
+            result[:, 3] *= over_life.values(self.opacity_over_life, life)
+        return result
+
+    def _levels(self, p: Particles, v: Array) -> Array:
+        """Where each particle stands in the palette, from 0 to 1."""
         if self.color_by == "speed":
             value = np.sqrt((v * v).sum(axis=1))
         elif self.color_by == "id":
             value = (p.id * 0.6180339887498949) % 1.0  # neighbours get colours far apart
         else:
-            value = p.column(self.color_by)
-        low, high = self.color_range or ((value.min(), value.max()) if n else (0.0, 1.0))
-        level = np.clip((value - low) / (high - low if high > low else 1.0), 0, 1)
-        return palette(self.palette, level, self.brightness)
+            value = p.column(str(self.color_by))
+        low, high = self.color_range or ((value.min(), value.max()) if len(p) else (0.0, 1.0))
+        level: Array = np.clip((value - low) / (high - low if high > low else 1.0), 0, 1)
+        return level
 
     def _collider(self, collider: Collider, k: int, t: float, extent: float, frame: int) -> Triangles:
         floor = isinstance(collider, Plane) and collider.direction[1] > 0.95
@@ -237,25 +308,6 @@ class Trails:
                 glow=look.particles == "glow",
             )
         ]
-
-
-def linear(color: str, brightness: float = 1.0) -> NDArray[np.float32]:
-    """A colour name or "#rrggbb" as linear-light RGBA, shape (4,)."""
-    from PIL import ImageColor
-
-    try:
-        rgb = np.array(ImageColor.getrgb(color)[:3], np.float64) / 255
-    except (ValueError, AttributeError):
-        raise InvalidInput(f"color {color!r} is not known: use a name such as orange, or #rrggbb") from None
-    light = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-    return np.append(brightness * light, 1.0).astype(np.float32)
-
-
-def palette(name: str, level: Array, brightness: float = 1.0) -> NDArray[np.float32]:
-    """Colours of levels in [0, 1], shape (n, 4)."""
-    anchors = np.array([linear(c, brightness) for c in PALETTES[name]])
-    at = np.linspace(0, 1, len(anchors))
-    return np.stack([np.interp(level, at, anchors[:, k]) for k in range(4)], axis=1).astype(np.float32)
 
 
 def _bounds(x: Array) -> tuple[Array, Array]:

@@ -35,6 +35,7 @@ VERSION = 1
 LISTS: dict[str, Mapping[str, Any]] = {"bodies": BODIES, "forces": FORCES, "colliders": COLLIDERS, "emitters": EMITTERS}
 DTYPES = ("float64", "float32")
 LARGEST = 2**63 - 1
+MAY_LAST = re.compile(r"emitters\.|bodies\.\d+\.lifetime")  # values that may be infinite
 
 
 class Table(BaseModel):
@@ -72,6 +73,15 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
     "Scalar": SCALAR,
     "Selection": (str | list[int] | list[bool], "the name of a body or group, or a list of rows"),
     "Vector": VECTOR,
+    "Color": (str | float, "a colour, such as orange or #ffb454, or a temperature [K]"),
+    "Curve": (
+        str | list[_exactly(2, float)],  # type: ignore[misc]
+        "a list of [fraction of the life, value], or the name of a curve",
+    ),
+    "Gradient": (
+        str | list[_exactly(2, float | str)],  # type: ignore[misc]
+        "a list of [fraction of the life, colour], or the name of a gradient",
+    ),
     BOX: (_exactly(2, _exactly(3, float)), "two corners, such as [[0, 0, 0], [1, 1, 1]]"),
     "bool": (bool, "true or false"),
     "dict[str, Any]": (dict[str, float | list[float]], "a table of numbers, or of lists of numbers"),
@@ -313,7 +323,7 @@ def _check_table(where: str, form: type[Table], table: Any, prefix: str) -> None
 
 def _check_numbers(value: Any, path: str = "") -> None:
     """Refuse NaN everywhere, infinity where nothing lasts for ever, and whole numbers that no array holds."""
-    if isinstance(value, float) and (math.isnan(value) or (math.isinf(value) and not path.startswith("emitters."))):
+    if isinstance(value, float) and (math.isnan(value) or (math.isinf(value) and not MAY_LAST.match(path))):
         raise InvalidInput(f"{path} = {value} is not allowed: it must be a finite number")
     if isinstance(value, int) and not -LARGEST <= value <= LARGEST:
         raise InvalidInput(f"{path} = {shown(value)} is not allowed: a whole number has at most 64 bits, as in TOML")
