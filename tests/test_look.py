@@ -165,6 +165,42 @@ def test_a_streak_is_the_way_since_the_shutter_opened_or_the_birth() -> None:
     np.testing.assert_allclose(points.color[:, 3], 0.25)  # it has shone for a quarter of the time
 
 
+def test_groups_look_otherwise() -> None:
+    p = pm.Particles(np.arange(15.0).reshape(5, 3), hot=[0, 0, 1, 1, 0], radius=0.1, red=1, green=0, blue=0)
+    p.tag("smoke", [0, 3])
+    groups = {"smoke": {"particles": "smoke", "size": 0.5}, "hot": pm.Look(particles="glow", shutter=0.1)}
+    frame = last_frame(pm.ParticleSystem(p), pm.Look(groups=groups, trails=0.5), 5)  # type: ignore[arg-type]
+    smoke, hot, rest = of_kind(frame, Points)
+    assert [d.name for d in (smoke, hot, rest)] == ["particles of smoke", "particles of hot", "particles"]
+    np.testing.assert_array_equal(smoke.index, [0, 3])
+    np.testing.assert_array_equal(hot.index, [2])  # 3 has gone to the first
+    np.testing.assert_array_equal(rest.index, [1, 4])
+    assert (smoke.soft, smoke.radius, hot.glow, hot.motion.shape) == (True, 0.5, True, (1, 3))
+    assert smoke.color.shape == (2, 4)
+    (trails,) = of_kind(frame, Curves)
+    assert len(trails.offsets) == 3
+    with pytest.raises(InvalidInput, match="unknown group or attribute of particles in look"):
+        last_frame(pm.ParticleSystem(p), pm.Look(groups={"smok": pm.Look()}))
+
+
+@pytest.mark.parametrize(
+    ("group", "sentence"),
+    [
+        ("glow", "look.groups.a must be a look or a table"),
+        ({"trails": 1.0}, "unknown key in look.groups.a: 'trails'"),
+        ({"size": -1}, "look.groups.a: look.size = -1"),
+        (pm.Look(trails=1.0), "look.groups.a.trails is not allowed"),
+    ],
+)
+def test_bad_looks_of_groups(group: object, sentence: str) -> None:
+    with pytest.raises(InvalidInput, match=sentence):
+        pm.Look(groups={"a": group})  # type: ignore[dict-item]
+    if isinstance(group, dict | str):
+        text = f"[look.groups]\na = {group!r}\n".replace(": ", " = ").replace("{'", "{").replace("' =", " =")
+        with pytest.raises(InvalidInput, match=r"look\.groups\.a"):
+            pm.Scene.from_toml('[[bodies]]\ntype = "points"\nx = [[0, 0, 0]]\n' + text)
+
+
 def test_looks_survive_as_text() -> None:
     look = pm.Look(
         particles="smoke",
@@ -173,6 +209,7 @@ def test_looks_survive_as_text() -> None:
         opacity_over_life="fade",
         color_over_life=[[0, "#ffffff"], [0.5, 2000]],  # type: ignore[arg-type]
         shutter=0.01,
+        groups={"points": {"particles": "glow", "size_over_life": [[0, 1], [1, 2]]}, "hot": pm.Look(color=900.0)},  # type: ignore[dict-item]
     )
     scene = pm.Scene(bodies=[pm.points([[0, 0, 0], [1, 0, 0]], lifetime=[1.5, np.inf])], look=look)
     again = pm.Scene.from_toml(scene.to_toml())

@@ -80,7 +80,8 @@ def planckian(kelvin: NDArray[np.float64]) -> NDArray[np.float64]:
     # Divided by what there is at 780 nm, or a cold body's light would vanish among the numbers.
     power = (780.0 / nm) ** 5 * np.expm1(SECOND / (780.0 * kelvin[:, None])) / np.expm1(SECOND / (nm * kelvin[:, None]))
     xyz: NDArray[np.float64] = (power[:, :, None] * _observer(nm)).sum(axis=1)
-    return xyz / xyz.sum(axis=1, keepdims=True)
+    xyz /= xyz.sum(axis=1, keepdims=True)
+    return xyz
 
 
 def _observer(nm: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -37,6 +37,7 @@ class Points:
     motion : the way that each went while the shutter was open [m], shape (k, 3): a glow's light is spread evenly over
         it, and ends where the point is now. None = a moment.
     normals : the balls are thin discs across these directions, shape (k, 3).
+    daylight : factor on the light of the picture's lamps on puffs and discs; what glows lights them, too.
     """
 
     kind: ClassVar[str] = "points"
@@ -50,6 +51,7 @@ class Points:
     soft: bool = False
     motion: Floats | None = None
     normals: Floats | None = None
+    daylight: float = 1.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

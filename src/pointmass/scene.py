@@ -397,6 +397,8 @@ def _settings(kind: Any, table: Mapping[str, Any]) -> Any:
 
 
 def _tuples(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _tuples(item) for name, item in value.items()}
     return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
 
 

@@ -27,7 +27,7 @@ from pointmass.errors import InvalidInput, shown, unknown
 from pointmass.forces import FORCES
 from pointmass.frame import Camera
 from pointmass.laws.unary import VelocityField
-from pointmass.look import Look
+from pointmass.look import OF_PARTICLES, Look
 from pointmass.simulation import DEFAULT_DT
 from pointmass.solvers import ALIASES, SOLVERS, find_solver
 
@@ -160,8 +160,8 @@ def checked(document: Mapping[str, Any]) -> Mapping[str, Any]:
         for k, table in enumerate(_list(what, document.get(what, []))):
             _check_entry(f"{what}.{k}", what, table, registry)
     _check_solver(document.get("solver"))
-    for what in ("camera", "look"):
-        _check_table(what, settings_model(what), document.get(what, {}), f"{what}.")
+    _check_table("camera", settings_model("camera"), document.get("camera", {}), "camera.")
+    _check_look(document.get("look", {}))
     _check_numbers(document)
     return document
 
@@ -171,8 +171,22 @@ def settings_model(what: str) -> type[Table]:
     """The model of the camera or the look."""
     kind = {"camera": Camera, "look": Look}[what]
     docs = documented(kind)
-    entries = {f.name: (str(f.type), docs.get(f.name, ""), f.default) for f in fields(kind)}
-    return _created(what, entries, {})
+    entries = {f.name: (str(f.type), docs.get(f.name, ""), f.default) for f in fields(kind) if f.name != "groups"}
+    result = _created(what, entries, {})
+    if what == "look":
+        groups: Any = (dict[str, group_model()], Field(default=None, description=docs["groups"]))  # type: ignore[misc]
+        allowed = result.allowed | {"groups": "a table of tables, such as [look.groups.smoke]"}
+        result = create_model(what, __base__=result, groups=groups)
+        result.allowed = allowed
+    return result
+
+
+@cache
+def group_model() -> type[Table]:
+    """The model of the look of a group."""
+    docs = documented(Look)
+    entries = {f.name: (str(f.type), docs[f.name], f.default) for f in fields(Look) if f.name in OF_PARTICLES}
+    return _created("look_of_group", entries, {})
 
 
 @cache
@@ -300,6 +314,13 @@ def _check_solver(value: Any) -> None:
         _check_table(f"solver ({name})", entry_model("solver", name), {**value, "type": name}, "solver.")
     else:
         find_solver(kind)
+
+
+def _check_look(table: Any) -> None:
+    groups = table.get("groups") if isinstance(table, Mapping) else None
+    for name, group in groups.items() if isinstance(groups, Mapping) else ():
+        _check_table(f"look.groups.{name}", group_model(), group, f"look.groups.{name}.")
+    _check_table("look", settings_model("look"), table, "look.")
 
 
 def _check_table(where: str, form: type[Table], table: Any, prefix: str) -> None:

@@ -102,6 +102,13 @@ def test_puffs_take_each_others_light():
     assert thin.min() > 0.85 * thin.max()
 
 
+def test_at_night_only_glows_light_smoke():
+    night = Style(bottom=(0, 0, 0), top=(0, 0, 0), bloom=0, pool=0)
+    assert shone(np.zeros((1, 3)), puff(daylight=0.0), style=night).max() == 0
+    half, whole = (shone(np.zeros((1, 3)), puff(daylight=d), style=night) for d in (0.5, 1.0))
+    np.testing.assert_allclose(half, 0.5 * whole, rtol=1e-5)
+
+
 def test_glows_light_smoke_by_the_square_of_the_distance():
     places = np.array([[0.0, 0, 0], [3.0, 0, 0]])
     dark = Style(light=(0, -1, 0), ambient=0.0, pool=0.0)

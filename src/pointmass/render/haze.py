@@ -49,7 +49,7 @@ def light(rows: F32, lamp: F32, shadow: Shadow, glows: F64) -> None:
     straight = lit[:, None] * key
     far = (((centre - (0.0, 0.0, numbers[18])) * numbers[17]) ** 2).sum(axis=1)
     pool = (1.0 / (1.0 + far * far))[:, None]
-    own = pool * albedo
+    own = pool * albedo * rows[:, 25:26]
     rows[:, 9:12] = own * (straight + around) + albedo * _glowing(rows, glows) + (1.0 - pool) * numbers[19:22]
     rows[:, 12:15] = np.where(flat[:, None], 0.0, SIDE * own * straight)
     rows[:, 15] *= np.float32(to_key[0])

@@ -4,7 +4,8 @@ Columns: 0-1 centre [pixels], 2-4 the form a ex^2 + 2 b ex ey + c ey^2 that is 1
 the edge is (1 = as soft as can be), 6 alpha, 7 the 1/z by which it is hidden, 8 how sharply, 9-11 linear RGB in the
 middle, 12-14 how much more of it there is at the edge towards the light, 15-16 the way to that edge [1/pixels];
 17-19 centre in view coordinates [m], 20 radius [m], 21-23 normal of a flake (0 for a puff), 24 how thick a puff is
-in the middle (optical depth). Before they are lit, 9-11 are the colour of the thing itself.
+in the middle (optical depth), 25 share of the lamps' light that it gets. Before they are lit, 9-11 are the colour of
+the thing itself.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pointmass.frame import Frame, Points
 from pointmass.render.camera import View, turn
 from pointmass.render.tables import F64, Table, bounded, colors, column, corners, named, pixel_box
 
-COLUMNS = 25
+COLUMNS = 26
 PUFF = 1.6  # a puff ends at this many radii
 MIN_PUFF = 1.5  # and is never narrower than this radius [pixels]: it fades instead
 DENSEST = 0.98  # an alpha from here on makes a puff no thicker
@@ -55,7 +56,7 @@ def sprites(points: Points, frame: Frame, view: View, focus: float) -> Table:
     seen, radius, color, normals = seen[keep], radius[keep], color[keep], normals[keep]
     rows = np.zeros((len(seen), COLUMNS))
     rows[:, 0:2], rows[:, 6], rows[:, 9:12] = view.project(seen), color[:, 3], color[:, :3]
-    rows[:, 17:20], rows[:, 20] = seen, radius
+    rows[:, 17:20], rows[:, 20], rows[:, 25] = seen, radius, points.daylight
     if points.normals is None:
         _puffs(rows, view)
     else:
