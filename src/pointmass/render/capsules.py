@@ -98,23 +98,25 @@ def streaks(points: Points, frame: Frame, view: View) -> Table:
         raise InvalidInput(f"drawable {points.name!r} has {len(places)} items, but motions of shape {motion.shape}")
     radius = column(points.radius, len(places), points.name)
     color = colors(points.color, len(places), points.name)
-    rows = _rows(view.see(places - bounded(motion)), view.see(places), radius, radius, color, color)
+    ends = np.concatenate((view.see(places - bounded(motion)), view.see(places)), axis=1)
     with np.errstate(invalid="ignore"):
-        keep = np.isfinite(rows.sum(axis=1)) & (np.maximum(rows[:, 2], rows[:, 5]) > view.near)
-        keep &= (radius > 0.0) & (color[:, 3] > 0.0)
-    rows = rows[keep]
-    _clip(rows, view.near)
-    a, b = view.project(rows[:, 0:3]), view.project(rows[:, 3:6])
+        keep = np.isfinite(ends.sum(axis=1) + radius + color.sum(axis=1)) & (radius > 0.0) & (color[:, 3] > 0.0)
+        keep &= np.maximum(ends[:, 2], ends[:, 5]) > view.near
+    ends, radius, color = ends[keep], radius[keep], color[keep]
+    _clip(ends, view.near)
+    a, b = view.project(ends[:, 0:3]), view.project(ends[:, 3:6])
     short = np.sqrt(((b - a) ** 2).sum(axis=1)) < SHORTEST
     a[short] = b[short] = 0.5 * (a + b)[short]
     a[short, 0] -= 0.5 * SHORTEST
     b[short, 0] += 0.5 * SHORTEST
-    rows[:, 8:10], rows[:, 10:12], rows[:, 24] = a, b, 2.0
-    pixels = 0.5 * view.focal * (rows[:, 6] / rows[:, 2] + rows[:, 7] / rows[:, 5])
+    rows = np.zeros((len(ends), COLUMNS), dtype=np.float32)  # a million sparks are ordinary: no table of doubles
+    rows[:, 0:6], rows[:, 6], rows[:, 7], rows[:, 8:10], rows[:, 10:12] = ends, radius, radius, a, b
+    rows[:, 12:16], rows[:, 16:20], rows[:, 24] = color, color, 2.0
+    pixels = 0.5 * view.focal * radius * (1.0 / ends[:, 2] + 1.0 / ends[:, 5])
     reach = np.maximum(HALO * pixels, MIN_POINT)[:, None]
     box = pixel_box(np.minimum(a, b) - reach, np.maximum(a, b) + reach, view.width, view.height)
-    depth = 0.5 * (rows[:, 2] + rows[:, 5])
-    return Table(rows.astype(np.float32), box, depth, np.zeros(len(rows), bool), np.ones(len(rows), bool))
+    depth = 0.5 * (ends[:, 2] + ends[:, 5])
+    return Table(rows, box, depth, np.zeros(len(rows), bool), np.ones(len(rows), bool))
 
 
 def _rows(a: F64, b: F64, ra: F64, rb: F64, ca: F64, cb: F64) -> F64:
