@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 
 import pointmass as pm
-from pointmass.look import linear
+from pointmass.colors import linear
 from pointmass.render import fit_camera, image
 
 FOLDER = Path(__file__).parent / "images"
@@ -60,6 +60,14 @@ def scene_picture(name, scene, number, shown, size=SIZE):
     """A frame of a scene, by a camera that shows so many frames up to it."""
     frames = list(scene.simulation().frames(number + 1, scene.fps))
     save(name, frames[number], fit_camera(frames[-shown:], scene.camera, size), size)
+
+
+def of_page(name):
+    """The last frame of a scene file in docs/scenes.md, and its camera."""
+    page = (FOLDER.parent / "scenes.md").read_text(encoding="utf-8")
+    scene = pm.Scene.from_toml(page.split(f"```toml\n# {name}.toml\n")[1].split("```")[0])
+    frame = last(scene.simulation().frames(scene.frames, scene.fps))
+    return frame, scene.camera
 
 
 def shipped(name, number, shown=1):
@@ -183,6 +191,21 @@ def capsule():
     save("capsule", last(scene.simulation().frames(120, 60)), pm.Camera(azimuth=12, elevation=10))
 
 
+def sparks():
+    """Sparks of docs/scenes.md."""
+    save("sparks", *of_page("sparks"))
+
+
+def smoke():
+    """Smoke of docs/scenes.md."""
+    save("smoke", *of_page("smoke"))
+
+
+def snow():
+    """Flakes of docs/scenes.md."""
+    save("snow", *of_page("snow"))
+
+
 def pendulum():
     """The shipped scene pendulum."""
     shipped("pendulum", 66)
@@ -222,6 +245,9 @@ PICTURES = (
     bounces,
     cloth,
     capsule,
+    sparks,
+    smoke,
+    snow,
     pendulum,
     bounce,
     flow_scene,

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import pointmass as pm
+from pointmass.colors import PALETTES, blackbody, linear, palette
 from pointmass.errors import InvalidInput
 from pointmass.frame import Arrows, Curves, Points, Segments, Triangles
-from pointmass.look import PALETTES, linear, palette
+from pointmass.over_life import CURVES, GRADIENTS, values
 
 
 def last_frame(system: pm.ParticleSystem, look: pm.Look, frames: int = 20) -> pm.Frame:
@@ -104,10 +105,137 @@ def test_palette_ends_and_colours() -> None:
     np.testing.assert_allclose(linear("#bc0000")[0], 0.5029, atol=1e-3)  # sRGB 188 is half the light
 
 
+def aging(**look: object) -> Points:
+    """Three particles at age 0.5 s that live for 1 s, 2 s and for ever."""
+    p = pm.Particles(np.eye(3), v=[[0, 6, 0]], radius=0.1, lifetime=[1, 2, np.inf], red=0.1, green=0.2, blue=[0, 1, 0])
+    sim = pm.Simulation(pm.ParticleSystem(p), look=pm.Look(**look), dt=0.125, compiled=False)  # type: ignore[arg-type]
+    sim.step(4)
+    (points,) = of_kind(sim.frame(), Points)
+    return points
+
+
+def test_looks_change_over_the_life() -> None:
+    points = aging(
+        size_over_life="grow",
+        opacity=0.5,
+        opacity_over_life=((0, 0.2), (0.5, 1.0)),
+        brightness=2.0,
+        brightness_over_life=((0.25, 1), (0.75, 3)),
+        color_over_life=((0, "black"), (1, "white")),
+    )
+    np.testing.assert_allclose(points.radius, [0.05, 0.025, 0.0], rtol=1e-6)
+    np.testing.assert_allclose(points.color[:, 3], [0.5, 0.3, 0.1], rtol=1e-6)
+    own = np.array([[0.1, 0.2, 0], [0.1, 0.2, 1], [0.1, 0.2, 0]])  # on which the gradient is a factor
+    np.testing.assert_allclose(points.color[:, :3], 2 * np.array([[1.0], [0.25], [0.0]]) * own, rtol=1e-6)
+
+
+def test_gradients_and_temperatures() -> None:
+    p = pm.Particles(np.eye(3), lifetime=1.0, temperature=[1000, 2000, 1e5])
+    sim = pm.Simulation(pm.ParticleSystem(p), look=pm.Look(color_by="temperature"), dt=0.25, compiled=False)
+    (points,) = of_kind(sim.frame(), Points)
+    np.testing.assert_allclose(points.color[:, :3], blackbody([1000, 2000, 1e5]), rtol=1e-6)
+    sim.look = pm.Look(color_over_life=((0, 3000), (1, 1000)))
+    sim.step(2)
+    (points,) = of_kind(sim.frame(), Points)
+    np.testing.assert_allclose(points.color[:, :3], [blackbody(2000)] * 3, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", [*CURVES, *GRADIENTS])
+def test_named_curves_are_as_written(name: str) -> None:
+    pairs = CURVES.get(name) or GRADIENTS[name]
+    look = pm.Look(size_over_life=pairs) if name in CURVES else pm.Look(color_over_life=pairs)  # type: ignore[arg-type]
+    assert (look.size_over_life or look.color_over_life) == pairs
+    if name in CURVES:
+        np.testing.assert_array_equal(values(name, np.array([f for f, _ in pairs])), [v for _, v in pairs])
+
+
+def test_a_frame_within_a_step_shows_ages_of_its_own_time() -> None:
+    p = pm.Particles([[0, 0, 0]], lifetime=1.0)
+    look = pm.Look(size=1.0, size_over_life="grow")
+    for frame in pm.Simulation(pm.ParticleSystem(p), look=look, dt=0.1, compiled=False).frames(8, fps=13):
+        (points,) = of_kind(frame, Points)
+        np.testing.assert_allclose(points.radius, frame.time, atol=1e-6)
+
+
+def test_a_streak_is_the_way_since_the_shutter_opened_or_the_birth() -> None:
+    points = aging(particles="glow", shutter=0.25)
+    np.testing.assert_allclose(points.motion, [[0, 1.5, 0]] * 3, rtol=1e-6)
+    points = aging(particles="glow", shutter=2.0)
+    np.testing.assert_allclose(points.motion, [[0, 3, 0]] * 3, rtol=1e-6)
+    np.testing.assert_allclose(points.color[:, 3], 0.25)  # it has shone for a quarter of the time
+
+
+def test_groups_look_otherwise() -> None:
+    p = pm.Particles(np.arange(15.0).reshape(5, 3), hot=[0, 0, 1, 1, 0], radius=0.1, red=1, green=0, blue=0)
+    p.tag("smoke", [0, 3])
+    groups = {"smoke": {"particles": "smoke", "size": 0.5}, "hot": pm.Look(particles="glow", shutter=0.1)}
+    frame = last_frame(pm.ParticleSystem(p), pm.Look(groups=groups, trails=0.5), 5)  # type: ignore[arg-type]
+    smoke, hot, rest = of_kind(frame, Points)
+    assert [d.name for d in (smoke, hot, rest)] == ["particles of smoke", "particles of hot", "particles"]
+    np.testing.assert_array_equal(smoke.index, [0, 3])
+    np.testing.assert_array_equal(hot.index, [2])  # 3 has gone to the first
+    np.testing.assert_array_equal(rest.index, [1, 4])
+    assert (smoke.soft, smoke.radius, hot.glow, hot.motion.shape) == (True, 0.5, True, (1, 3))
+    assert smoke.color.shape == (2, 4)
+    (trails,) = of_kind(frame, Curves)
+    assert len(trails.offsets) == 3
+    with pytest.raises(InvalidInput, match="unknown group or attribute of particles in look"):
+        last_frame(pm.ParticleSystem(p), pm.Look(groups={"smok": pm.Look()}))
+
+
+@pytest.mark.parametrize(
+    ("group", "sentence"),
+    [
+        ("glow", "look.groups.a must be a look or a table"),
+        ({"trails": 1.0}, "unknown key in look.groups.a: 'trails'"),
+        ({"size": -1}, "look.groups.a: look.size = -1"),
+        (pm.Look(trails=1.0), "look.groups.a.trails is not allowed"),
+    ],
+)
+def test_bad_looks_of_groups(group: object, sentence: str) -> None:
+    with pytest.raises(InvalidInput, match=sentence):
+        pm.Look(groups={"a": group})  # type: ignore[dict-item]
+    if isinstance(group, dict | str):
+        text = f"[look.groups]\na = {group!r}\n".replace(": ", " = ").replace("{'", "{").replace("' =", " =")
+        with pytest.raises(InvalidInput, match=r"look\.groups\.a"):
+            pm.Scene.from_toml('[[bodies]]\ntype = "points"\nx = [[0, 0, 0]]\n' + text)
+
+
+def test_looks_survive_as_text() -> None:
+    look = pm.Look(
+        particles="smoke",
+        color=2000.0,
+        size_over_life=[[0, 1], [1, 4]],  # type: ignore[arg-type]
+        opacity_over_life="fade",
+        color_over_life=[[0, "#ffffff"], [0.5, 2000]],  # type: ignore[arg-type]
+        shutter=0.01,
+        groups={"points": {"particles": "glow", "size_over_life": [[0, 1], [1, 2]]}, "hot": pm.Look(color=900.0)},  # type: ignore[dict-item]
+    )
+    scene = pm.Scene(bodies=[pm.points([[0, 0, 0], [1, 0, 0]], lifetime=[1.5, np.inf])], look=look)
+    again = pm.Scene.from_toml(scene.to_toml())
+    assert again.look == look
+    assert again == scene
+    np.testing.assert_array_equal(again.simulation().system.particles.lifetime, [1.5, np.inf])
+
+
 @pytest.mark.parametrize(
     ("values", "sentence"),
     [
-        ({"particles": "balls"}, "must be solid, glow or none"),
+        ({"particles": "balls"}, "must be solid, glow, smoke, flakes, none"),
+        ({"opacity": 1.5}, "look.opacity = 1.5"),
+        ({"shutter": -1.0}, "look.shutter = -1.0"),
+        ({"color": 300.0}, "color = 300.0"),
+        ({"size_over_life": "grwo"}, "did you mean 'grow'"),
+        ({"size_over_life": ()}, "look.size_over_life must be a list of pairs"),
+        ({"size_over_life": ((0.0, 1.0, 2.0),)}, "must be a list of pairs"),
+        ({"size_over_life": ((0.5, 1.0), (0.2, 2.0))}, "look.size_over_life is out of order"),
+        ({"size_over_life": ((0.5, 1.0), (0.5, 2.0))}, "0.5 comes after 0.5"),
+        ({"size_over_life": ((0.0, 1.0), (1.5, 2.0))}, "a fraction of look.size_over_life = 1.5"),
+        ({"brightness_over_life": ((0.0, -1.0),)}, "the value at 0.0 of look.brightness_over_life = -1.0"),
+        ({"opacity_over_life": ((0.0, 2.0),)}, "at most 1"),
+        ({"opacity_over_life": ((float("nan"), 0.0),)}, "a fraction of look.opacity_over_life = nan"),
+        ({"color_over_life": ((0.0, "reddish"),)}, "color 'reddish'"),
+        ({"color_over_life": "hot"}, "unknown gradient"),
         ({"color": "reddish"}, "color 'reddish' is not known"),
         ({"palette": "fyre"}, "did you mean 'fire'"),
         ({"size": 0.0}, "look.size = 0.0"),

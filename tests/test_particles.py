@@ -19,7 +19,7 @@ def test_columns():
     np.testing.assert_array_equal(p.w, [1, 0.5, 0.25, 0.125])
     np.testing.assert_array_equal(p.column("heat"), [1, 2, 3, 4])
     np.testing.assert_array_equal(p.column("radius"), [0.1] * 4)
-    assert p.columns == ["m", "radius", "age", "charge", "heat"]
+    assert p.columns == ["m", "radius", "age", "lifetime", "charge", "heat"]
     assert p.id.tolist() == [0, 1, 2, 3]
     assert (p.f == 0).all()
     assert "4, 0 pinned, float64" in repr(p)
@@ -37,7 +37,7 @@ def test_shapes_of_places(x, expected):
 def test_precision(dtype):
     p = Particles(X, m=2, charge=1, dtype=dtype)
     p.add([[1, 2, 3]])
-    for column in (p.x, p.v, p.f, p.m, p.w, p.radius, p.age, p.column("charge")):
+    for column in (p.x, p.v, p.f, p.m, p.w, p.radius, p.age, p.lifetime, p.column("charge")):
         assert column.dtype == np.dtype(dtype)
     assert p.id.dtype == np.int64
 
@@ -66,6 +66,11 @@ def test_input_is_copied():
         ({"x": X, "m": [1, 2]}, "m must have shape"),
         ({"x": X, "m": np.inf}, "m must be finite"),
         ({"x": X, "radius": -1}, "radius = -1.0 is not allowed"),
+        ({"x": X, "lifetime": 0}, "lifetime = 0.0 is not allowed: it must be greater than 0 [s], or inf"),
+        ({"x": X, "lifetime": [1, np.inf, -2, 1]}, "lifetime = -2.0 is not allowed"),
+        ({"x": X, "lifetime": np.nan}, "lifetime must be finite, but entry 0 is nan"),
+        ({"x": X, "lifetime": "long"}, "lifetime must be numbers"),
+        ({"x": X, "lifetime": 1e39, "dtype": np.float32}, "lifetime has a number that is too large for float32"),
         ({"x": X, "charge": [1, 2]}, "charge must have shape"),
         ({"x": X, "t": 1.0}, "particle attribute 't' is not allowed"),
         ({"x": X, "age": 1.0}, "particle attribute 'age' is not allowed"),

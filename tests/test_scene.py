@@ -343,7 +343,7 @@ BODY = '[[bodies]]\ntype = "chain"\n'
         (BODY + '[look]\ncolour = "red"\n', "unknown key in look: 'colour': did you mean 'color'"),
         (
             BODY + '[look]\nparticles = "shiny"\n',
-            "look.particles = 'shiny' is not allowed: .* 'solid', 'glow' or 'none'",
+            "look.particles = 'shiny' is not allowed: .* 'solid', 'glow', .* or 'none'",
         ),
         (
             BODY + "[look]\ncolor_range = [1]\n",

@@ -25,7 +25,7 @@ NEAREST, FARTHEST = 1e-12, 1e15  # from a camera to its target [m]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Points:
-    """Particles as balls (shaded, solid) or as light (`glow`, added up).
+    """Particles as balls (shaded, solid), as light (`glow`, added up), as puffs (`soft`) or as flakes (`normals`).
 
     Attributes
     ----------
@@ -33,6 +33,11 @@ class Points:
     radius : [m], shape (k,) or ().
     color : linear RGBA, shape (k, 4) or (4,).
     glow : True: soft light that adds to what lies behind; False: an opaque shaded ball.
+    soft : True: a translucent puff of smoke, thick in the middle, through which light comes to others.
+    motion : the way that each went while the shutter was open [m], shape (k, 3): a glow's light is spread evenly over
+        it, and ends where the point is now. None = a moment.
+    normals : the balls are thin discs across these directions, shape (k, 3).
+    daylight : factor on the light of the picture's lamps on puffs and discs; what glows lights them, too.
     """
 
     kind: ClassVar[str] = "points"
@@ -43,6 +48,10 @@ class Points:
     radius: Floats | float = 0.02
     color: Floats | tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     glow: bool = False
+    soft: bool = False
+    motion: Floats | None = None
+    normals: Floats | None = None
+    daylight: float = 1.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -3,28 +3,44 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pointmass import over_life, random
 from pointmass.collisions.collider import Collider
 from pointmass.collisions.plane import Plane
-from pointmass.errors import InvalidInput, finite_array, number, unknown, whole_number
+from pointmass.colors import PALETTES, Color, blackbody, linear, palette
+from pointmass.errors import InvalidInput, about, finite_array, number, shown, unknown, whole_number
 from pointmass.forces.springs import Springs
 from pointmass.frame import Arrows, Curves, Drawable, Points, Segments, Triangles
 from pointmass.laws.unary import VelocityField
+from pointmass.over_life import Curve, Gradient
 from pointmass.particles import Array, Particles
 from pointmass.solvers import FunctionSystem, Midpoint
 from pointmass.system import ParticleSystem
 
-PALETTES = {  # sRGB anchors from low to high
-    "fire": ("#3b0f5c", "#a01a58", "#e8452c", "#ffa62b", "#fff3b0"),
-    "ice": ("#0b2545", "#13518f", "#2f9fd0", "#8fe0f0", "#f4ffff"),
-    "spectrum": ("#5465ff", "#2ec4b6", "#9be15d", "#ffd23f", "#ff5d5d"),
-    "aurora": ("#16324f", "#18a999", "#7ae582", "#f6f740", "#ff6f91"),
-}
+KINDS = ("solid", "glow", "smoke", "flakes", "none")  # of particles
+OWN_COLOR = ("red", "green", "blue")  # attributes: linear light
+OF_PARTICLES = (  # what a group may have otherwise
+    *(
+        "particles",
+        "size",
+        "color",
+        "color_by",
+        "color_range",
+        "palette",
+        "brightness",
+        "opacity",
+        "daylight",
+        "shutter",
+    ),
+    *("size_over_life", "brightness_over_life", "opacity_over_life", "color_over_life"),
+)
+SMALLEST_FLAKE, LARGEST_FLAKE = 0.5, 1.5  # times the size
 CURVE_STEPS = 60
 FAMILY_COLORS = {"stretch": "#5fa8ff", "shear": "#5fe3a1", "bend": "#ff6b6b", "volume": "#ff6b6b"}  # as on the slide
 
@@ -35,13 +51,27 @@ class Look:
 
     Attributes
     ----------
-    particles : "solid": shaded balls; "glow": points of light; "none".
+    particles : "solid": shaded balls; "glow": points of light; "smoke": soft puffs that shade each other; "flakes":
+        matt flakes of many sizes and directions; "none".
     size : radius at which particles are drawn [m]; None = their own radius, or 1% of the scene if they have none.
-    color : of particles, a name or "#rrggbb".
-    color_by : "speed", "age", "id" or a particle attribute: colours from the palette instead.
+    color : of particles, a name, "#rrggbb", or the temperature [K] at which a body glows in this colour. Particles with
+        attributes red, green and blue (linear light) have their own.
+    color_by : "speed", "age", "id" or a particle attribute: colours from the palette instead; "temperature": that of
+        each particle's attribute temperature [K].
     color_range : values at both ends of the palette; None = those of the frame.
     palette : fire, ice, spectrum or aurora.
-    brightness : factor on the light of glowing particles.
+    brightness : factor on the light of particles.
+    opacity : of particles, from 0 to 1; of a puff of smoke in its middle.
+    daylight : factor on the light of the picture's lamps on smoke and flakes; 0: only what glows lights them.
+    size_over_life, brightness_over_life, opacity_over_life : factors on these over the life of a particle, as pairs of
+        a fraction of its lifetime and a value, straight in between: [[0, 1], [0.8, 1], [1, 0]]; or grow, fade, last,
+        swell, flare. A particle that never dies stays at the first value.
+    color_over_life : pairs of a fraction of the lifetime and a colour or temperature [K], or cooling, or the name of a
+        palette: colours instead of `color`, on which `color_by` and particles' own colours are factors.
+    groups : other looks for some particles, by the name of a group, or of an attribute that is not 0 for them; tables
+        of what is said here of particles. Who is in several has the first.
+    shutter : exposure time [s]: a glowing particle is a streak as long as the way that it went meanwhile, and as much
+        dimmer; 0 = none. Films have half the time between two frames.
     springs : whether springs are drawn, as lines of `spring_width` [m] (None = 0.3% of the scene) and `spring_color`
         (None = by family).
     trails : length of the particles' trails [s], 0 = none.
@@ -54,27 +84,35 @@ class Look:
         far as one can see.
     """
 
-    particles: Literal["solid", "glow", "none"] = "solid"
+    particles: Literal["solid", "glow", "smoke", "flakes", "none"] = "solid"
     size: float | None = None
-    color: str = "#ffb454"
+    color: Color = "#ffb454"
     color_by: str | None = None
     color_range: tuple[float, float] | None = None
     palette: str = "fire"
     brightness: float = 1.0
+    opacity: float = 1.0
+    daylight: float = 1.0
+    size_over_life: Curve | None = None
+    brightness_over_life: Curve | None = None
+    opacity_over_life: Curve | None = None
+    color_over_life: Gradient | None = None
+    shutter: float = 0.0
+    groups: Groups | None = None
     springs: bool = True
     spring_width: float | None = None
-    spring_color: str | None = None
+    spring_color: Color | None = None
     trails: float = 0.0
     arrows: int = 0
     streamlines: int = 0
     field_box: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
     colliders: bool = True
-    collider_color: str = "#5b6678"
+    collider_color: Color = "#5b6678"
     floor_size: float | None = None
 
     def __post_init__(self) -> None:
-        if self.particles not in ("solid", "glow", "none"):
-            raise InvalidInput(f"look.particles = {self.particles!r} is not allowed: it must be solid, glow or none")
+        if self.particles not in KINDS:
+            raise InvalidInput(f"look.particles = {self.particles!r} is not allowed: it must be {', '.join(KINDS)}")
         if self.palette not in PALETTES:
             raise unknown("palette", self.palette, PALETTES)
         for color in (self.color, self.collider_color, self.spring_color):
@@ -84,6 +122,17 @@ class Look:
             if getattr(self, name) is not None:
                 number(f"look.{name}", getattr(self, name), above=0, unit="m")
         number("look.brightness", self.brightness, at_least=0)
+        number("look.opacity", self.opacity, at_least=0, at_most=1)
+        number("look.daylight", self.daylight, at_least=0)
+        number("look.shutter", self.shutter, at_least=0, unit="s")
+        for name, most in (("size_over_life", None), ("brightness_over_life", None), ("opacity_over_life", 1.0)):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, over_life.as_curve(f"look.{name}", getattr(self, name), most))
+        if self.groups is not None:
+            object.__setattr__(self, "groups", {name: _of_group(name, look) for name, look in self.groups.items()})
+        if self.color_over_life is not None:
+            gradient = over_life.as_gradient("look.color_over_life", self.color_over_life)
+            object.__setattr__(self, "color_over_life", gradient)
         number("look.trails", self.trails, at_least=0, unit="s")
         if self.field_box is not None:
             finite_array("look.field_box", self.field_box, (2, 3))
@@ -92,14 +141,18 @@ class Look:
 
     def described(self) -> dict[str, Any]:
         """The fields that are not at their default."""
-        return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) != f.default}
+        values = {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) != f.default}
+        if self.groups:
+            values["groups"] = {name: look.described() for name, look in self.groups.items()}
+        return values
 
     def drawables(
         self, system: ParticleSystem, t: float, x: Array, v: Array, frame: int, stage: Stage
     ) -> tuple[Drawable, ...]:
         """Everything that a frame shows, for the system at (t, x, v)."""
         extent = stage.extent
-        colors = self._colors(system, x, v)
+        age = np.maximum(system.particles.age - (system.t - t), 0)
+        parts = self._parts(system.particles)
         result: list[Drawable] = []
         if self.colliders:
             result += [self._collider(c, k, t, extent, frame) for k, c in enumerate(system.colliders)]
@@ -108,29 +161,89 @@ class Look:
         if self.springs:
             result += self._springs(system, extent)
         if self.trails > 0:
-            result += stage.trails.drawn(self, system.particles.id, colors, extent, frame)
-        if self.particles != "none" and len(x):
-            own = system.particles.radius
-            radius = self.size or np.where(own > 0, own, 0.01 * extent).astype(np.float32)
-            result.append(
-                Points(name="particles", version=frame, radius=radius, color=colors, glow=self.particles == "glow")
-            )
+            _, _, rows = parts[-1]
+            colors = self._colors(system.particles, v, age, rows)
+            result += stage.trails.drawn(self, system.particles.id[rows], colors, extent, frame)
+        for name, look, rows in parts:
+            if look.particles != "none" and len(rows):
+                result.append(look._particles(name, system.particles, v, age, rows, extent, frame))
         return tuple(result)
 
-    def _colors(self, system: ParticleSystem, x: Array, v: Array) -> Array:
-        n = len(x)
-        if self.color_by is None:
-            return np.tile(linear(self.color, self.brightness), (n, 1))
-        p = system.particles
+    def _parts(self, p: Particles) -> list[tuple[str, Look, NDArray[np.intp]]]:
+        """Name, look and rows of the particles of each group, and in the end of all others."""
+        parts = []
+        rest = np.ones(len(p), bool)
+        for name, look in (self.groups or {}).items():
+            if name not in p.groups and name not in p.attributes:
+                raise unknown("group or attribute of particles in look.groups:", name, [*p.groups, *p.attributes])
+            mine = rest & (p.groups[name] if name in p.groups else p.attributes[name] != 0)
+            rest &= ~mine
+            parts.append((f"particles of {name}", look, np.flatnonzero(mine)))
+        return [*parts, ("particles", self, np.flatnonzero(rest))]
+
+    def _particles(
+        self, name: str, p: Particles, v: Array, age: Array, rows: NDArray[np.intp], extent: float, frame: int
+    ) -> Points:
+        own = p.radius[rows]
+        radius: Any = self.size or np.where(own > 0, own, 0.01 * extent).astype(np.float32)
+        if self.size_over_life is not None:
+            radius = (radius * over_life.values(self.size_over_life, _life(p, age, rows))).astype(np.float32)
+        colors = self._colors(p, v, age, rows)
+        motion = normals = None
+        if self.shutter > 0:
+            # Who was born while the shutter was open shines for a part of the time only.
+            exposed = np.minimum(age[rows], self.shutter)
+            motion = (v[rows] * exposed[:, None]).astype(np.float32)
+            colors[:, 3] *= exposed / self.shutter
+        if self.particles == "flakes":
+            size = random.uniform(0, "flakes", p.id[rows], "size")[:, 0]
+            radius = (radius * (SMALLEST_FLAKE + (LARGEST_FLAKE - SMALLEST_FLAKE) * size)).astype(np.float32)
+            normals = random.direction(0, "flakes", p.id[rows], "direction").astype(np.float32)
+        return Points(
+            name=name,
+            version=frame,
+            index=None if len(rows) == len(p) else rows.astype(np.int32),
+            radius=radius,
+            color=colors,
+            glow=self.particles == "glow",
+            soft=self.particles == "smoke",
+            motion=motion,
+            normals=normals,
+            daylight=self.daylight,
+        )
+
+    def _colors(self, p: Particles, v: Array, age: Array, rows: NDArray[np.intp]) -> NDArray[np.float32]:
+        """Linear RGBA of each particle."""
+        light: Any = 1.0
+        if self.color_by == "temperature":
+            light = blackbody(p.column("temperature")[rows])
+        elif self.color_by is not None:
+            light = palette(self.palette, self._levels(p, v, rows))[:, :3]
+        elif all(name in p.attributes for name in OWN_COLOR):
+            light = np.stack([p.attributes[name][rows] for name in OWN_COLOR], axis=1)
+        elif self.color_over_life is None:
+            light = linear(self.color)[:3]
+        if self.color_over_life is not None:
+            light = light * over_life.colors(self.color_over_life, _life(p, age, rows))
+        result = np.empty((len(rows), 4), np.float32)
+        result[:, :3], result[:, 3] = self.brightness * light, self.opacity
+        if self.brightness_over_life is not None:
+            result[:, :3] *= over_life.values(self.brightness_over_life, _life(p, age, rows))[:, None]
+        if self.opacity_over_life is not None:
+            result[:, 3] *= over_life.values(self.opacity_over_life, _life(p, age, rows))
+        return result
+
+    def _levels(self, p: Particles, v: Array, rows: NDArray[np.intp]) -> Array:
+        """Where each particle stands in the palette, from 0 to 1."""
         if self.color_by == "speed":
-            value = np.sqrt((v * v).sum(axis=1))
+            value = np.sqrt((v[rows] ** 2).sum(axis=1))
         elif self.color_by == "id":
-            value = (p.id * 0.6180339887498949) % 1.0  # neighbours get colours far apart
+            value = (p.id[rows] * 0.6180339887498949) % 1.0  # neighbours get colours far apart
         else:
-            value = p.column(self.color_by)
-        low, high = self.color_range or ((value.min(), value.max()) if n else (0.0, 1.0))
-        level = np.clip((value - low) / (high - low if high > low else 1.0), 0, 1)
-        return palette(self.palette, level, self.brightness)
+            value = p.column(str(self.color_by))[rows]
+        low, high = self.color_range or ((value.min(), value.max()) if len(rows) else (0.0, 1.0))
+        level: Array = np.clip((value - low) / (high - low if high > low else 1.0), 0, 1)
+        return level
 
     def _collider(self, collider: Collider, k: int, t: float, extent: float, frame: int) -> Triangles:
         floor = isinstance(collider, Plane) and collider.direction[1] > 0.95
@@ -170,6 +283,31 @@ class Look:
         if self.streamlines:
             result.append(_streamlines(system, t, low, high, self.streamlines, version))
         return result
+
+
+Groups = Mapping[str, Look]
+
+
+def _of_group(name: str, look: Any) -> Look:
+    """The look of a group, from a table or made already."""
+    if not isinstance(look, Look):
+        if not isinstance(look, Mapping):
+            raise InvalidInput(f"look.groups.{name} must be a look or a table of its values, not {shown(look)}")
+        for key in look:
+            if key not in OF_PARTICLES:
+                raise unknown(f"key in look.groups.{name}:", key, OF_PARTICLES)
+        with about(f"look.groups.{name}"):
+            return Look(**look)
+    for key in look.described():
+        if key not in OF_PARTICLES:
+            raise InvalidInput(f"look.groups.{name}.{key} is not allowed: a group has {', '.join(OF_PARTICLES)}")
+    return look
+
+
+def _life(p: Particles, age: Array, rows: NDArray[np.intp]) -> Array:
+    """Which fraction of its lifetime each has behind it."""
+    life: Array = np.minimum(age[rows] / p.lifetime[rows], 1)
+    return life
 
 
 class Stage:
@@ -237,25 +375,6 @@ class Trails:
                 glow=look.particles == "glow",
             )
         ]
-
-
-def linear(color: str, brightness: float = 1.0) -> NDArray[np.float32]:
-    """A colour name or "#rrggbb" as linear-light RGBA, shape (4,)."""
-    from PIL import ImageColor
-
-    try:
-        rgb = np.array(ImageColor.getrgb(color)[:3], np.float64) / 255
-    except (ValueError, AttributeError):
-        raise InvalidInput(f"color {color!r} is not known: use a name such as orange, or #rrggbb") from None
-    light = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
-    return np.append(brightness * light, 1.0).astype(np.float32)
-
-
-def palette(name: str, level: Array, brightness: float = 1.0) -> NDArray[np.float32]:
-    """Colours of levels in [0, 1], shape (n, 4)."""
-    anchors = np.array([linear(c, brightness) for c in PALETTES[name]])
-    at = np.linspace(0, 1, len(anchors))
-    return np.stack([np.interp(level, at, anchors[:, k]) for k in range(4)], axis=1).astype(np.float32)
 
 
 def _bounds(x: Array) -> tuple[Array, Array]:

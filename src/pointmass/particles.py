@@ -15,7 +15,8 @@ Array = NDArray[np.floating[Any]]
 Selection = str | slice | ArrayLike | None  # a group's name, a mask, rows; None = all
 FIRST_FOREIGN_ID = 2**40  # ids from here on are made by emitters, and leave no mark on the count
 NOT_ATTRIBUTES = ("t", "y", "z", "vx", "vy", "vz", "e", "pi", "dtype", "self")  # these mean something else
-FIELDS = ("x", "v", "f", "m", "w", "age", "radius", "id", "pinned")
+FIELDS = ("x", "v", "f", "m", "w", "age", "lifetime", "radius", "id", "pinned")
+PLAIN = ("m", "radius", "age", "lifetime")  # columns of one number that all particles have
 
 
 class Column:
@@ -77,6 +78,19 @@ def _lengths(name: str, value: ArrayLike, n: int) -> Array:
     return radius
 
 
+def _lifetimes(name: str, value: ArrayLike, n: int) -> Array:
+    array = floats(value)
+    if array is None:
+        return _column(name, value, n)  # says what is wrong
+    endless = array == np.inf
+    lifetime = _column(name, np.where(endless, 1.0, array), n)
+    if (lifetime <= 0).any():
+        raise InvalidInput(
+            f"lifetime = {lifetime.min()} is not allowed: it must be greater than 0 [s], or inf for no end"
+        )
+    return np.where(endless, np.inf, lifetime)
+
+
 class Particles:
     """Point masses as columns.
 
@@ -89,6 +103,8 @@ class Particles:
     pinned : which particles are held where they are, shape (n,); see `pin`.
     radius : [m], shape (n,); a particle touches a collider at this distance.
     age : [s], shape (n,).
+    lifetime : age at which a particle dies [s], shape (n,); inf = never. Forces may ask for ``age / lifetime``. A
+        simulation notes it when the run starts, and when an emitter gives birth.
     id : shape (n,), int64; never used again once a particle is gone.
     version : counts changes of the structure (add, remove, pin, groups), so that what is derived from it can be kept.
 
@@ -96,7 +112,7 @@ class Particles:
     ----------
     x : shape (n, 3), or (n, 2) for a plane (z = 0), or one point.
     v : like `x`, or one vector for all; at rest by default.
-    m, radius : numbers or shape (n,).
+    m, radius, lifetime : numbers or shape (n,).
     dtype : float64 or float32.
     attributes : further columns by name, numbers or shape (n,): charge, temperature, ...
 
@@ -108,7 +124,7 @@ class Particles:
     """
 
     x, v, f = Column(_points), Column(_points), Column(_points)
-    m, radius, age = Column(_masses), Column(_lengths), Column(_column)
+    m, radius, age, lifetime = Column(_masses), Column(_lengths), Column(_column), Column(_lifetimes)
 
     def __init__(
         self,
@@ -117,6 +133,7 @@ class Particles:
         m: ArrayLike = 1.0,
         radius: ArrayLike = 0.0,
         *,
+        lifetime: ArrayLike = np.inf,
         dtype: DTypeLike = np.float64,
         **attributes: ArrayLike,
     ) -> None:
@@ -126,12 +143,12 @@ class Particles:
         self.version = 0
         self._next_id = 0
         self._arrays = {name: np.zeros((0, 3), self.dtype) for name in "xvf"}
-        self._arrays |= {name: np.zeros(0, self.dtype) for name in ("m", "radius", "age")}
+        self._arrays |= {name: np.zeros(0, self.dtype) for name in PLAIN}
         self._held = np.zeros(0, bool)
         self.id = np.zeros(0, np.int64)
         for name in attributes:
             self.attributes[attribute_name(name)] = np.zeros(0, self.dtype)
-        self.add(x, v, m, radius, **attributes)
+        self.add(x, v, m, radius, lifetime=lifetime, **attributes)
 
     def __len__(self) -> int:
         return len(self.id)
@@ -156,6 +173,7 @@ class Particles:
         m: ArrayLike = 1.0,
         radius: ArrayLike = 0.0,
         *,
+        lifetime: ArrayLike = np.inf,
         id: ArrayLike | None = None,
         **attributes: ArrayLike,
     ) -> NDArray[np.int64]:
@@ -169,7 +187,7 @@ class Particles:
         x = _points("x", x)
         n = len(x)
         v = np.zeros((n, 3)) if v is None else _points("v", v, n)
-        m, radius = _masses("m", m, n), _lengths("radius", radius, n)
+        m, radius, lifetime = _masses("m", m, n), _lengths("radius", radius, n), _lifetimes("lifetime", lifetime, n)
         with np.errstate(over="ignore"):
             if not np.isfinite((1 / m).astype(self.dtype)).all():
                 raise InvalidInput(f"m = {m.min()} is not allowed: 1/m is too large for {self.dtype}")
@@ -178,7 +196,8 @@ class Particles:
                 raise unknown("particle attribute", name, self.attributes)
         columns = {name: _column(name, attributes.get(name, 0.0), n) for name in self.attributes}
         ids = self._new_ids(n, id)
-        new = {"x": x, "v": v, "f": np.zeros((n, 3)), "m": m, "radius": radius, "age": np.zeros(n)}
+        new = {"x": x, "v": v, "f": np.zeros((n, 3)), "m": m, "radius": radius}
+        new |= {"age": np.zeros(n), "lifetime": lifetime}
         new, columns = ({name: self._cast(name, part) for name, part in d.items()} for d in (new, columns))
         self._next_id = max(self._next_id, int(ids[ids < FIRST_FOREIGN_ID].max(initial=-1)) + 1)
         for name, values in new.items():
@@ -268,17 +287,17 @@ class Particles:
         return np.where(self.id[rows] == ids, rows, -1)
 
     def column(self, name: str) -> Array:
-        """A column of numbers by name: m, radius, age or a further attribute, shape (n,)."""
-        if name in ("m", "radius", "age"):
+        """A column of numbers by name: m, radius, age, lifetime or a further attribute, shape (n,)."""
+        if name in PLAIN:
             return getattr(self, name)  # type: ignore[no-any-return]
         if name not in self.attributes:
-            raise unknown("particle attribute", name, ["m", "radius", "age", *self.attributes])
+            raise unknown("particle attribute", name, self.columns)
         return self.attributes[name]
 
     @property
     def columns(self) -> list[str]:
         """Names that `column` knows."""
-        return ["m", "radius", "age", *self.attributes]
+        return [*PLAIN, *self.attributes]
 
     def _new_ids(self, n: int, ids: ArrayLike | None) -> NDArray[np.int64]:
         if ids is None:
@@ -294,7 +313,7 @@ class Particles:
     def _cast(self, name: str, values: Array) -> Array:
         with np.errstate(over="ignore"):
             result = values.astype(self.dtype)
-        if not np.isfinite(result).all():
+        if (np.isinf(result) & ~np.isinf(values)).any():
             raise InvalidInput(f"{name} has a number that is too large for {self.dtype}")
         return result
 

@@ -234,6 +234,8 @@ def body_of(particles: Particles, forces: Sequence[Force] = ()) -> Body:
     """A body for scenes from particles and forces that were made by hand."""
     p = particles
     arguments = {"x": p.x, "v": p.v, "m": p.m, "radius": p.radius, "pinned": np.flatnonzero(p.pinned).tolist()}
+    if np.isfinite(p.lifetime).any():
+        arguments["lifetime"] = p.lifetime
     if p.attributes:
         arguments["attributes"] = dict(p.attributes)
     return Body(p, list(forces), "points", arguments)
@@ -300,7 +302,7 @@ def _check_as_built(body: Body) -> None:
     built = BODIES[body.kind](**body.arguments)
     p, q = built.particles, body.particles
     same = p.attributes.keys() == q.attributes.keys() and p.groups.keys() == q.groups.keys()
-    pairs = [(p.x, q.x), (p.v, q.v), (p.m, q.m), (p.radius, q.radius), (p.pinned, q.pinned)]
+    pairs = [(p.x, q.x), (p.v, q.v), (p.m, q.m), (p.radius, q.radius), (p.lifetime, q.lifetime), (p.pinned, q.pinned)]
     pairs += [(p.attributes[a], q.attributes[a]) for a in p.attributes if same]
     pairs += [(p.groups[g], q.groups[g]) for g in p.groups if same]
     forces = [(type(f), f.enabled) for f in built.forces] == [(type(f), f.enabled) for f in body.forces]
@@ -395,6 +397,8 @@ def _settings(kind: Any, table: Mapping[str, Any]) -> Any:
 
 
 def _tuples(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _tuples(item) for name, item in value.items()}
     return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
 
 

@@ -27,7 +27,7 @@ from pointmass.errors import InvalidInput, shown, unknown
 from pointmass.forces import FORCES
 from pointmass.frame import Camera
 from pointmass.laws.unary import VelocityField
-from pointmass.look import Look
+from pointmass.look import OF_PARTICLES, Look
 from pointmass.simulation import DEFAULT_DT
 from pointmass.solvers import ALIASES, SOLVERS, find_solver
 
@@ -35,6 +35,7 @@ VERSION = 1
 LISTS: dict[str, Mapping[str, Any]] = {"bodies": BODIES, "forces": FORCES, "colliders": COLLIDERS, "emitters": EMITTERS}
 DTYPES = ("float64", "float32")
 LARGEST = 2**63 - 1
+MAY_LAST = re.compile(r"emitters\.|bodies\.\d+\.lifetime")  # values that may be infinite
 
 
 class Table(BaseModel):
@@ -72,6 +73,15 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
     "Scalar": SCALAR,
     "Selection": (str | list[int] | list[bool], "the name of a body or group, or a list of rows"),
     "Vector": VECTOR,
+    "Color": (str | float, "a colour, such as orange or #ffb454, or a temperature [K]"),
+    "Curve": (
+        str | list[_exactly(2, float)],  # type: ignore[misc]
+        "a list of [fraction of the life, value], or the name of a curve",
+    ),
+    "Gradient": (
+        str | list[_exactly(2, float | str)],  # type: ignore[misc]
+        "a list of [fraction of the life, colour], or the name of a gradient",
+    ),
     BOX: (_exactly(2, _exactly(3, float)), "two corners, such as [[0, 0, 0], [1, 1, 1]]"),
     "bool": (bool, "true or false"),
     "dict[str, Any]": (dict[str, float | list[float]], "a table of numbers, or of lists of numbers"),
@@ -150,8 +160,8 @@ def checked(document: Mapping[str, Any]) -> Mapping[str, Any]:
         for k, table in enumerate(_list(what, document.get(what, []))):
             _check_entry(f"{what}.{k}", what, table, registry)
     _check_solver(document.get("solver"))
-    for what in ("camera", "look"):
-        _check_table(what, settings_model(what), document.get(what, {}), f"{what}.")
+    _check_table("camera", settings_model("camera"), document.get("camera", {}), "camera.")
+    _check_look(document.get("look", {}))
     _check_numbers(document)
     return document
 
@@ -161,8 +171,22 @@ def settings_model(what: str) -> type[Table]:
     """The model of the camera or the look."""
     kind = {"camera": Camera, "look": Look}[what]
     docs = documented(kind)
-    entries = {f.name: (str(f.type), docs.get(f.name, ""), f.default) for f in fields(kind)}
-    return _created(what, entries, {})
+    entries = {f.name: (str(f.type), docs.get(f.name, ""), f.default) for f in fields(kind) if f.name != "groups"}
+    result = _created(what, entries, {})
+    if what == "look":
+        groups: Any = (dict[str, group_model()], Field(default=None, description=docs["groups"]))  # type: ignore[misc]
+        allowed = result.allowed | {"groups": "a table of tables, such as [look.groups.smoke]"}
+        result = create_model(what, __base__=result, groups=groups)
+        result.allowed = allowed
+    return result
+
+
+@cache
+def group_model() -> type[Table]:
+    """The model of the look of a group."""
+    docs = documented(Look)
+    entries = {f.name: (str(f.type), docs[f.name], f.default) for f in fields(Look) if f.name in OF_PARTICLES}
+    return _created("look_of_group", entries, {})
 
 
 @cache
@@ -292,6 +316,13 @@ def _check_solver(value: Any) -> None:
         find_solver(kind)
 
 
+def _check_look(table: Any) -> None:
+    groups = table.get("groups") if isinstance(table, Mapping) else None
+    for name, group in groups.items() if isinstance(groups, Mapping) else ():
+        _check_table(f"look.groups.{name}", group_model(), group, f"look.groups.{name}.")
+    _check_table("look", settings_model("look"), table, "look.")
+
+
 def _check_table(where: str, form: type[Table], table: Any, prefix: str) -> None:
     """A table whose keys are known and whose values are of the right kinds."""
     if not isinstance(table, Mapping):
@@ -313,7 +344,7 @@ def _check_table(where: str, form: type[Table], table: Any, prefix: str) -> None
 
 def _check_numbers(value: Any, path: str = "") -> None:
     """Refuse NaN everywhere, infinity where nothing lasts for ever, and whole numbers that no array holds."""
-    if isinstance(value, float) and (math.isnan(value) or (math.isinf(value) and not path.startswith("emitters."))):
+    if isinstance(value, float) and (math.isnan(value) or (math.isinf(value) and not MAY_LAST.match(path))):
         raise InvalidInput(f"{path} = {value} is not allowed: it must be a finite number")
     if isinstance(value, int) and not -LARGEST <= value <= LARGEST:
         raise InvalidInput(f"{path} = {shown(value)} is not allowed: a whole number has at most 64 bits, as in TOML")

@@ -97,7 +97,9 @@ class Simulation:
         self._start = system.get_state()
         self._stage = Stage(self.look, system.particles.x)
         self._looks = self.t0, 0, 1.0  # time of a frame, how many were looked at from it on, and how many in a second
-        self._mortal, self._death = np.zeros(0, np.int64), np.zeros(0)  # who dies, and when [s]
+        p = system.particles
+        mortal = np.isfinite(p.lifetime)
+        self._mortal, self._death = p.id[mortal], self.t0 + (p.lifetime - p.age)[mortal]  # who dies, and when [s]
         self._speed_limit = RUNAWAY * self._natural_speed()
 
     @property
@@ -258,7 +260,7 @@ class Simulation:
         clock = [np.full(len(self.system.particles), t0)]
         for k, birth in born:
             if len(birth.number):
-                self.system.add(birth.x, birth.v, id=birth.ids(k), **birth.columns)
+                self.system.add(birth.x, birth.v, lifetime=birth.lifetime, id=birth.ids(k), **birth.columns)
                 clock.append(np.maximum(birth.time, t0))
         return np.concatenate(clock)
 

@@ -72,6 +72,21 @@ def test_deaths_are_on_time():
     assert system.particles.id[0] == 0
 
 
+def test_lifetimes_are_columns_that_bodies_and_forces_may_use():
+    p = pm.Particles(np.eye(3), v=[1, 0, 0], lifetime=[0.25, 0.5, np.inf])
+    system = pm.ParticleSystem(p, [pm.Drag("age / lifetime")])
+    sim = pm.Simulation(system, dt=1 / 64, emitters=[pm.Nozzle(rate=8, lifetime=0.25)], compiled=False)
+    sim.step(15)
+    assert (p.id[:3] == [0, 1, 2]).all()
+    assert p.v[0, 0] < p.v[1, 0] < p.v[2, 0] == 1
+    np.testing.assert_array_equal(p.lifetime, [0.25, 0.5, np.inf, 0.25, 0.25])
+    sim.step()
+    assert (p.id[:2] == [1, 2]).all()
+    sim.step(48)
+    assert p.id[0] == 2
+    assert (p.age < p.lifetime).all()
+
+
 def test_particles_added_by_hand_have_ids_of_their_own():
     system = pm.ParticleSystem(pm.Particles([[9, 9, 9]]), [pm.Gravity()])
     sim = pm.Simulation(system, dt=1 / 60, emitters=[pm.Nozzle(rate=100), pm.Nozzle(rate=100)])

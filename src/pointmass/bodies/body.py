@@ -69,7 +69,7 @@ def join(bodies: Sequence[Body], names: Sequence[str], dtype: Any) -> tuple[Part
     forces: list[Force] = []
     for name, part in zip(names, bodies, strict=True):
         p, offset = part.particles, len(whole)
-        whole.add(p.x, p.v, p.m, p.radius, **p.attributes)
+        whole.add(p.x, p.v, p.m, p.radius, lifetime=p.lifetime, **p.attributes)
         rows = np.arange(offset, offset + len(p))
         for group, mask in {name: np.ones(len(p), bool), **p.groups}.items():
             if group in whole.groups:

@@ -230,7 +230,10 @@ def _robust(rows: Vector, percentiles: bool) -> Vector:
     if len(rows) <= MANY:
         return rows
     # A film has too many frames to keep all balls: the outermost in many directions stand for the hull.
-    outermost: Vector = rows[np.unique(np.argmax(rows[:, :3] @ DIRECTIONS.T + rows[:, 3:], axis=0))]
+    # One direction at a time: a table of all would be a hundred times as large as a cloud that is large already.
+    x, y, z, radius = np.ascontiguousarray(rows.T)
+    found = [int(np.argmax(d[0] * x + d[1] * y + d[2] * z + radius)) for d in DIRECTIONS]
+    outermost: Vector = rows[np.unique(found)]
     return outermost
 
 

@@ -1,8 +1,8 @@
-"""Segments, curves and arrows as tapered capsules.
+"""Segments, curves and arrows as tapered capsules, and the streaks of glowing points that move.
 
 Columns: 0-2 and 3-5 both ends in view coordinates [m], 6-7 their radii [m], 8-9 and 10-11 both ends [pixels],
 12-15 and 16-19 linear RGBA at both ends, 20-21 and 22-23 the lines that cut the first and the last end: only what
-lies ahead of the first and behind the second is drawn (zeros: not cut), 24 = 1 for a glow.
+lies ahead of the first and behind the second is drawn (zeros: not cut), 24 = 1 for a glow, 2 for a streak.
 
 Pieces of a curve are cut where they meet, along the line that halves the angle, so that no pixel is laid over twice.
 """
@@ -12,7 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from pointmass.errors import InvalidInput
-from pointmass.frame import Arrows, Curves, Frame, Ints, Segments
+from pointmass.frame import Arrows, Curves, Frame, Ints, Points, Segments
+from pointmass.render.balls import HALO
+from pointmass.render.balls import MIN_GLOW as MIN_POINT
 from pointmass.render.camera import View
 from pointmass.render.tables import F64, OPAQUE, Mask, Table, bounded, colors, column, corners, named, pixel_box
 
@@ -23,6 +25,7 @@ SOLID = 2.0  # a line whose radius is less is laid over with a soft edge [pixels
 HEAD_WIDTH = 3.2  # radius of an arrow's head over the radius of its shaft
 HEAD_LENGTH = 2.4  # length of the head over its radius
 LONGEST_HEAD = 0.45  # and over the whole arrow
+SHORTEST = 0.5  # length of a streak; what is shorter is drawn as long as this [pixels]
 
 EMPTY = Table(
     np.zeros((0, COLUMNS), np.float32), np.zeros((0, 4), np.int32), np.zeros(0), np.zeros(0, bool), np.zeros(0, bool)
@@ -83,6 +86,37 @@ def arrows(drawable: Arrows, view: View) -> Table:
         np.concatenate((shaft.solid, cone.solid)),
         np.concatenate((shaft.adds, cone.adds)),
     )
+
+
+def streaks(points: Points, frame: Frame, view: View) -> Table:
+    """One capsule for each glowing point, along the way that it went while the shutter was open."""
+    places = corners(points, frame)
+    if points.index is not None:
+        places = named(places, points.index, points.name)
+    motion = np.asarray(points.motion, dtype=np.float64)
+    if motion.shape != places.shape:
+        raise InvalidInput(f"drawable {points.name!r} has {len(places)} items, but motions of shape {motion.shape}")
+    radius = column(points.radius, len(places), points.name)
+    color = colors(points.color, len(places), points.name)
+    ends = np.concatenate((view.see(places - bounded(motion)), view.see(places)), axis=1)
+    with np.errstate(invalid="ignore"):
+        keep = np.isfinite(ends.sum(axis=1) + radius + color.sum(axis=1)) & (radius > 0.0) & (color[:, 3] > 0.0)
+        keep &= np.maximum(ends[:, 2], ends[:, 5]) > view.near
+    ends, radius, color = ends[keep], radius[keep], color[keep]
+    _clip(ends, view.near)
+    a, b = view.project(ends[:, 0:3]), view.project(ends[:, 3:6])
+    short = np.sqrt(((b - a) ** 2).sum(axis=1)) < SHORTEST
+    a[short] = b[short] = 0.5 * (a + b)[short]
+    a[short, 0] -= 0.5 * SHORTEST
+    b[short, 0] += 0.5 * SHORTEST
+    rows = np.zeros((len(ends), COLUMNS), dtype=np.float32)  # a million sparks are ordinary: no table of doubles
+    rows[:, 0:6], rows[:, 6], rows[:, 7], rows[:, 8:10], rows[:, 10:12] = ends, radius, radius, a, b
+    rows[:, 12:16], rows[:, 16:20], rows[:, 24] = color, color, 2.0
+    pixels = 0.5 * view.focal * radius * (1.0 / ends[:, 2] + 1.0 / ends[:, 5])
+    reach = np.maximum(HALO * pixels, MIN_POINT)[:, None]
+    box = pixel_box(np.minimum(a, b) - reach, np.maximum(a, b) + reach, view.width, view.height)
+    depth = 0.5 * (ends[:, 2] + ends[:, 5])
+    return Table(rows, box, depth, np.zeros(len(rows), bool), np.ones(len(rows), bool))
 
 
 def _rows(a: F64, b: F64, ra: F64, rb: F64, ca: F64, cb: F64) -> F64:

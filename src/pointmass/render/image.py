@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
@@ -16,13 +17,16 @@ from pointmass.render.balls import balls
 from pointmass.render.bands import each
 from pointmass.render.camera import View, fit_camera, look
 from pointmass.render.capsules import EMPTY as NO_CAPSULES
-from pointmass.render.capsules import arrows, curves, segments
+from pointmass.render.capsules import arrows, curves, segments, streaks
+from pointmass.render.haze import light as light_sprites
 from pointmass.render.lamp import key_direction, lamp
 from pointmass.render.meshes import EMPTY as NO_FACES
 from pointmass.render.meshes import triangles
-from pointmass.render.shadow import Casters, casters, no_shadow, shadow
+from pointmass.render.shadow import Casters, Shadow, casters, no_shadow, shadow
+from pointmass.render.sprites import EMPTY as NO_SPRITES
+from pointmass.render.sprites import sprites
 from pointmass.render.style import Style
-from pointmass.render.tables import F32, F64, Mask, Table, join, visible
+from pointmass.render.tables import F32, F64, Mask, Table, colors, column, corners, join, named, visible
 
 Image = NDArray[np.uint8]
 Ints = NDArray[np.int64]
@@ -81,27 +85,28 @@ def checked_size(size: tuple[int, int]) -> tuple[int, int]:
 
 def _light(frame: Frame, camera: Camera, view: View, style: Style) -> tuple[F32, F32 | None]:
     """Linear light of the picture, and what spills around bright things at half the size; both as three planes."""
-    tables = _Tables()
+    tables = _Tables(math.dist(view.eye, np.asarray(camera.target)))
     for drawable in frame.drawables:
         tables.add(drawable, frame, view, style.shadows)
-    faces, round_ones, lines = tables.joined()
     map_ = shadow(tables.casters, key_direction(style, view)) if tables.casters else no_shadow()
+    light_from = (lamp(style, view, camera, map_), map_.depth, map_.matrix)
+    soft = tables.lit(light_from[0], map_, frame, view)
+    parts = (*tables.joined(), soft)
     from pointmass.render import kernels, kernels_shade
 
     draw: Callable[..., bool] = kernels.draw
     height, width = view.height, view.width
     columns, bands = -(-width // kernels_shade.TILE), -(-height // kernels_shade.BAND)
-    boxes = np.concatenate((faces.box, round_ones.box, lines.box))
+    boxes = np.concatenate([table.box for table in parts])
     lists: list[Ints] = []
-    for order in _orders((faces, round_ones, lines)):
+    for order in _orders(parts):
         starts, places = kernels.sort_into_tiles(boxes[order], columns, bands)
         lists += [starts, order[places]]
     light = np.empty((3, height, width), dtype=np.float32)
     bright = np.empty((3, (height + 1) // 2, (width + 1) // 2), dtype=np.float32)
     middle = np.array((view.focal, 0.5 * width, 0.5 * height, 1.0 / view.focal), dtype=np.float32)
     pictures = (light, bright, _gradient(style, height), middle)
-    things = [part for table in (faces, round_ones, lines) for part in (table.rows, table.box)]
-    light_from = (lamp(style, view, camera, map_), map_.depth, map_.matrix)
+    things = [part for table in parts for part in (table.rows, table.box)]
     spilled = np.zeros(bands, dtype=bool)
 
     def band(i: int) -> None:
@@ -125,19 +130,29 @@ def _room(samples: int) -> tuple[NDArray[Any], ...]:
 
 
 class _Tables:
-    """The rows of all drawables of a frame, and what of them throws shadows."""
+    """The rows of all drawables of a frame, and what of them throws shadows or light.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    focus : depth at which the picture is sharp [m].
+    """
+
+    def __init__(self, focus: float) -> None:
+        self.focus = focus
         self.faces: list[Table] = []
         self.balls: list[Table] = []
         self.lines: list[Table] = []
+        self.sprites: list[Table] = []
         self.casters: list[Casters] = []
+        self.glows: list[Points] = []
 
     def add(self, drawable: Drawable, frame: Frame, view: View, shadows: bool) -> None:
         """Rows of one drawable; what lies outside the picture is kept only for its shadow."""
         faces, round_ones, lines = NO_FACES, NO_BALLS, NO_CAPSULES
         if isinstance(drawable, Points):
-            round_ones = balls(drawable, frame, view)
+            if drawable.glow:
+                self.glows.append(drawable)
+            round_ones, lines = self._points(drawable, frame, view)
         elif isinstance(drawable, Segments):
             lines = segments(drawable, frame, view)
         elif isinstance(drawable, Curves):
@@ -154,9 +169,37 @@ class _Tables:
             if len(table.rows):
                 parts.append(table.take(visible(table.box)))
 
+    def _points(self, points: Points, frame: Frame, view: View) -> tuple[Table, Table]:
+        """Points as balls or as streaks, or noted as sprites."""
+        if points.soft or points.normals is not None:
+            self.sprites.append(sprites(points, frame, view, self.focus))
+            return NO_BALLS, NO_CAPSULES
+        if points.glow and points.motion is not None:
+            return NO_BALLS, streaks(points, frame, view)
+        return balls(points, frame, view), NO_CAPSULES
+
     def joined(self) -> tuple[Table, Table, Table]:
-        """Faces, balls and lines, each in the order of the drawables."""
+        """Faces, balls and lines in the picture, each in the order of the drawables."""
         return join(self.faces, NO_FACES), join(self.balls, NO_BALLS), join(self.lines, NO_CAPSULES)
+
+    def lit(self, lamp: F32, map_: Shadow, frame: Frame, view: View) -> Table:
+        """Puffs and flakes with their light; also those outside the picture throw their shadows on others."""
+        table = join(self.sprites, NO_SPRITES)
+        if len(table.rows):
+            glows = [_lights(points, frame, view) for points in self.glows]
+            light_sprites(table.rows, lamp, map_, np.concatenate([np.zeros((0, 6)), *glows]))
+        return table.take(visible(table.box))
+
+
+def _lights(points: Points, frame: Frame, view: View) -> F64:
+    """Glowing points as lamps: centre in view coordinates [m], colour times the square of the radius; shape (k, 6)."""
+    places = corners(points, frame)
+    places = view.see(places if points.index is None else named(places, points.index, points.name))
+    radius = column(points.radius, len(places), points.name)[:, None]
+    color = colors(points.color, len(places), points.name)
+    rows = np.concatenate((places, color[:, :3] * color[:, 3:] * radius * radius), axis=1)
+    lamps: F64 = rows[np.isfinite(rows).all(axis=1) & (rows[:, 3:] > 0.0).any(axis=1)]
+    return lamps
 
 
 def _orders(tables: tuple[Table, ...]) -> tuple[Ints, Ints]:

@@ -18,7 +18,8 @@ def _digest():
     """Of all text that ends up in a kernel's machine code."""
     folder = files("pointmass.render")
     names = sorted(f.name for f in folder.iterdir() if f.name.startswith("kernels") and f.name.endswith(".py"))
-    texts = [folder.joinpath(name).read_bytes() for name in ("inner.py", "balls.py", "capsules.py", *names)]
+    tables = ("balls.py", "capsules.py", "sprites.py")
+    texts = [folder.joinpath(name).read_bytes() for name in ("inner.py", *tables, *names)]
     return sha256(b"".join(texts)).hexdigest()[:16]
 
 

@@ -1,4 +1,4 @@
-"""The loops that draw: triangles, balls and capsules, tile by tile.
+"""The loops that draw: triangles, balls, capsules and sprites, tile by tile.
 
 The picture is cut into tiles of TILE x BAND pixels, whatever the number of threads. A tile walks the solid things that
 touch it (near ones first, with a z-buffer of several samples for each pixel), then lays the soft things over them, far
@@ -40,6 +40,7 @@ from pointmass.render.kernels_shade import (
     RED,
     TILE,
     TINY,
+    TWO,
     WAITING,
     ZERO,
     U,
@@ -63,6 +64,9 @@ GLOSS_LINE = np.float32(0.12)
 GLOSS_MESH = np.float32(0.06)
 FALLOFF = np.float32(0.55)  # how much darker a ball or line is where it turns away
 SKIRT = np.float32(0.15)  # strength of a glow's halo
+# Coefficients of the integrals of (1 - x^2)^9 and (1 - x^2)^3, by powers of x^2.
+C1, C2, C3, C4, C5, C6, C7, C8, C9 = (np.float32((-1) ** k * math.comb(9, k) / (2 * k + 1)) for k in range(1, 10))
+S2, S3 = np.float32(3.0 / 5.0), np.float32(-1.0 / 7.0)
 KNEE = np.float32(1.0)  # light above this spills
 HOTTEST = np.float32(24.0)  # and no more than this, or one spark would fill the picture
 SLACK = 1e-9  # [pixels] by which an inner span is shorter than it might be
@@ -496,6 +500,95 @@ def _capsule_glow(c, box, area, room, ramp, camera):
             line[BLUE + i] += f * (b + t * more_b)
 
 
+@inner
+def _passed(s):
+    """Integrals of (1 - x^2)^9 and (1 - x^2)^3 from 0 to s, for s from -1 to 1."""
+    q = s * s
+    core = q * (C8 + q * C9)
+    core = q * (C5 + q * (C6 + q * (C7 + core)))
+    core = q * (C2 + q * (C3 + q * (C4 + core)))
+    return s * (ONE + q * (C1 + core)), s * (ONE + q * (-ONE + q * (S2 + q * S3)))
+
+
+@inner
+def _streak(c, box, area, room, ramp, camera):
+    """A glowing point that moved: the mean of what `_ball_glow` gives on the way, so no light is won or lost.
+
+    At a distance h from the way, both powers of 1 - h^2 - x^2 are integrated over x from the first end to the last.
+    """
+    wa, wb = ONE / c[2], ONE / c[5]
+    full = HALO * HALF * camera[0] * (c[6] * wa + c[7] * wb)
+    reach = max(full, MIN_GLOW)
+    x, y, dx, dy = c[8], c[9], c[10] - c[8], c[11] - c[9]
+    length = math.sqrt(dx * dx + dy * dy)
+    ux, uy = dx / length, dy / length
+    shrunk, inverse = ONE / reach, ONE / length
+    strength = c[15] * (full * shrunk) * (full * shrunk) * reach * inverse
+    farther = wb - wa
+    sharp = TWO / (wa * wb * (c[6] + c[7]))
+    r, g, b = c[12], c[13], c[14]
+    left, right, first, last = _cut(box, area)
+    for row in range(first, last):
+        py = np.float32(row) + HALF
+        x0, x1 = _capsule_span(c, py, reach, left, right)
+        x0, x1 = _glow_span(area[0], x0, x1)
+        line = room[_place(row, area) + x0 :]
+        before, ey = np.float32(x0) - x, py - y
+        for i in range(x1 - x0):
+            ex = before + ramp[i]
+            along, off = ex * ux + ey * uy, (ex * uy - ey * ux) * shrunk
+            rest = max(ONE - off * off, TINY)
+            half = math.sqrt(rest)
+            scale = shrunk / half
+            core_b, skirt_b = _passed(clamp(along * scale, -ONE, ONE))
+            core_a, skirt_a = _passed(clamp((along - length) * scale, -ONE, ONE))
+            cube = rest * rest * rest
+            f = strength * half * cube * (cube * cube * (core_b - core_a) + SKIRT * (skirt_b - skirt_a))
+            w = wa + clamp(along * inverse, ZERO, ONE) * farther
+            f *= shown(line, i, w, sharp)
+            line[RED + i] += f * r
+            line[GREEN + i] += f * g
+            line[BLUE + i] += f * b
+
+
+@inner
+def _line_glow(c, box, area, room, ramp, camera):
+    """A capsule that only adds its light."""
+    if c[24] > ONE:
+        _streak(c, box, area, room, ramp, camera)
+    else:
+        _capsule_glow(c, box, area, room, ramp, camera)
+
+
+@inner
+def _sprite(s, box, area, room, ramp):
+    """A soft ellipse laid over; with u = 1 - d^2, u^3 is close to a Gaussian, and (hard u)^3 has a flat middle.
+
+    Light comes from one side, so its colour changes from edge to edge.
+    """
+    x, y, a, b, c, hard = s[0], s[1], s[2], s[3], s[4], s[5]
+    alpha, w, sharp = s[6], s[7], s[8]
+    red, green, blue = s[9], s[10], s[11]
+    more_red, more_green, more_blue, sx, sy = s[12], s[13], s[14], s[15], s[16]
+    left, right, first, last = _cut(box, area)
+    for row in range(first, last):
+        ey = np.float32(row) + HALF - y
+        middle, rest = -b * ey / a, ONE - c * ey * ey
+        half = math.sqrt(max(middle * middle + rest / a, ZERO)) + ONE
+        x0 = clamp(np.int64(math.floor(x + middle - half)), left, right)
+        x0, x1 = _glow_span(area[0], x0, clamp(np.int64(math.ceil(x + middle + half)), x0, right))
+        line = room[_place(row, area) + x0 :]
+        before, across, up = np.float32(x0) - x, (b + b) * ey, sy * ey
+        for i in range(x1 - x0):
+            ex = before + ramp[i]
+            u = clamp(hard * (rest - (a * ex + across) * ex), ZERO, ONE)
+            f = alpha * u * u * u * shown(line, i, w, sharp)
+            side = sx * ex + up
+            line[RED + i] += f * (red + side * more_red - line[RED + i])
+            line[GREEN + i] += f * (green + side * more_green - line[GREEN + i])
+            line[BLUE + i] += f * (blue + side * more_blue - line[BLUE + i])
+
+
 def _round(draw_solid, draw_soft, draw_glow):
     """What draws a ball or a capsule, by the three ways to draw its kind.
 
@@ -517,7 +610,7 @@ def _round(draw_solid, draw_soft, draw_glow):
 
 
 _ball = _round(_ball_solid, _ball_soft, _ball_glow)
-_capsule = _round(_capsule_solid, _capsule_soft, _capsule_glow)
+_capsule = _round(_capsule_solid, _capsule_soft, _line_glow)
 
 
 @inner
@@ -639,13 +732,20 @@ def _any_below(items, bound):
 @inner
 def _draw_all(items, solid, tables, area, tile, space):
     """The things of a tile, in their order."""
-    faces, face_box, balls, ball_box, capsules, capsule_box = tables
-    camera, offsets, steps, _ = space
-    capsule_first = len(faces) + len(balls)
+    faces, face_box, balls, ball_box, capsules, capsule_box, sprites, sprite_box = tables
+    camera, offsets, steps, ramp = space
+    ball_first, capsule_first = len(faces), len(faces) + len(balls)
+    sprite_first = capsule_first + len(capsules)
     count = NONE
     for item in items:
-        kind = 0 if item < len(faces) else (1 if item < capsule_first else 2)
-        i = item - (0 if kind == 0 else (len(faces) if kind == 1 else capsule_first))
+        if item >= sprite_first:
+            count = flush(tile, count)
+            i = item - sprite_first
+            for k in range(tile[4]):
+                _sprite(sprites[i], sprite_box[i], area, tile[0][k * BLOCK :], ramp)
+            continue
+        kind = 0 if item < ball_first else (1 if item < capsule_first else 2)
+        i = item - (0 if kind == 0 else (ball_first if kind == 1 else capsule_first))
         box = face_box[i] if kind == 0 else (ball_box[i] if kind == 1 else capsule_box[i])
         left, right, first, last = _cut(box, area)
         glows = not solid and (balls[i, 8] > ZERO if kind == 1 else (capsules[i, 24] > ZERO if kind == 2 else False))
@@ -664,7 +764,7 @@ def _draw_all(items, solid, tables, area, tile, space):
 @kernel
 def draw(
     band, picture, bright, background, camera, offsets, solid_starts, solids, soft_starts, softs,
-    faces, face_box, balls, ball_box, capsules, capsule_box, lamp, shadow, matrix,
+    faces, face_box, balls, ball_box, capsules, capsule_box, sprites, sprite_box, lamp, shadow, matrix,
     room, even, waiting, spots, steps, ramp,
 ):  # fmt: skip
     """Draw one band of tiles, in linear light; whether anything in it spills.
@@ -678,8 +778,8 @@ def draw(
     camera : focal length, centre, one over the focal length [pixels].
     offsets : samples within a pixel, shape (s, 2).
     solid_starts, solids, soft_starts, softs : numbers of the things that touch each tile, and where each tile's begin;
-        they count faces, then balls, then capsules.
-    faces, face_box, balls, ball_box, capsules, capsule_box : rows of the tables.
+        they count faces, then balls, then capsules, then sprites.
+    faces, face_box, balls, ball_box, capsules, capsule_box, sprites, sprite_box : rows of the tables.
     lamp : directions and colours of the light, see `lamp.py`.
     shadow, matrix : the shadow map.
     room, even, waiting, spots, steps, ramp : room to work in, see `image.py`.
@@ -687,7 +787,10 @@ def draw(
     height, width = picture.shape[1], picture.shape[2]
     picture, bright, background = bare(picture), bare(bright), bare(background)
     camera, offsets, lamp, shadow, matrix = bare(camera), bare(offsets), bare(lamp), bare(shadow), bare(matrix)
-    tables = (bare(faces), bare(face_box), bare(balls), bare(ball_box), bare(capsules), bare(capsule_box))
+    tables = (
+        bare(faces), bare(face_box), bare(balls), bare(ball_box), bare(capsules), bare(capsule_box), bare(sprites),
+        bare(sprite_box),
+    )  # fmt: skip
     room, even, waiting, spots = bare(room), bare(even), bare(waiting), bare(spots)
     space = (camera, offsets, bare(steps), bare(ramp))
     most = len(offsets)

@@ -81,7 +81,7 @@ def shadow(all_casters: list[Casters], light: F64) -> Shadow:
     found = np.concatenate(spots) if spots else np.zeros((0, 3))
     if not len(found):
         return no_shadow()
-    axes = _light_axes(light)
+    axes = light_axes(light)
     placed = turn(found, axes)
     low, high = _bounds(placed)
     widest = max((float(c.balls[:, 3].max()) for c in all_casters if len(c.balls)), default=0.0)
@@ -119,7 +119,7 @@ def _bounds(placed: F64) -> tuple[F64, F64]:
     return np.maximum(low, 2.0 * first - last), np.minimum(high, 2.0 * last - first)
 
 
-def _light_axes(light: F64) -> F64:
+def light_axes(light: F64) -> F64:
     """Two axes of the map and the direction in which the light flies, as rows."""
     forward = -light
     helper = np.array((0.0, 1.0, 0.0)) if abs(forward[1]) < 0.9 else np.array((1.0, 0.0, 0.0))

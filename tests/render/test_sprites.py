@@ -1,0 +1,186 @@
+"""Streaks, smoke and flakes."""
+
+import math
+
+import numpy as np
+import pytest
+from render_scenes import FRONT, frame, square
+
+from pointmass.errors import InvalidInput
+from pointmass.frame import Camera, Points, Triangles
+from pointmass.render import Style, image
+from pointmass.render.camera import look
+from pointmass.render.haze import light
+from pointmass.render.image import _light
+from pointmass.render.lamp import lamp
+from pointmass.render.shadow import no_shadow
+from pointmass.render.sprites import PUFF, sprites
+
+BLACK = Style(bottom=(0, 0, 0), top=(0, 0, 0), bloom=0.0, pool=0.0)
+SIZE = (160, 120)
+SCALE = 60.0 / math.tan(math.radians(15.0)) / 10.0  # pixels of a metre at the origin
+
+
+def shone(places, *drawables, size=SIZE, style=BLACK, camera=FRONT):
+    """Linear light of the picture before the tone map, shape (height, width, 3)."""
+    return _light(frame(places, *drawables), camera, look(camera, size), style)[0].transpose(1, 2, 0).astype(float)
+
+
+def spark(motion=None, radius=0.15, alpha=1.0, index=None):
+    return Points(name="s", index=index, radius=radius, color=(0.4, 0.2, 0.1, alpha), glow=True, motion=motion)
+
+
+@pytest.mark.parametrize("radius", [0.002, 0.03, 0.2])
+@pytest.mark.parametrize("motion", [(1e-9, 0, 0), (0.05, 0.03, 0), (1.5, 0.9, 0), (0, 2, 0), (0, 0, 3.0), (1, 1, -1)])
+def test_a_streak_has_the_light_of_its_spark(motion, radius):
+    place = np.array([[0.013, -0.021, 0.0]])
+    still, moved = (shone(place, spark(m, radius)) for m in (None, np.array([motion])))
+    mean = 10 / (10 + motion[2])  # of its area on the way, which begins nearer to the eye or farther away
+    assert moved.sum() == pytest.approx(mean * still.sum(), rel=0.01 if mean == 1 else 0.03)
+    if np.hypot(*motion[:2]) > 0.9:
+        assert moved.max() < 0.5 * still.max()
+
+
+def test_a_streak_is_the_mean_of_sparks_on_its_way():
+    # The naive way: many sparks, each a share as bright.
+    end, motion = np.array([0.7, 0.3, 0.0]), np.array([1.3, 0.4, 0.0])
+    count = 400
+    way = end - motion * ((np.arange(count) + 0.5) / count)[:, None]
+    many = shone(way, spark(alpha=1.0 / count))
+    one = shone(end[None], spark(motion[None]))
+    assert np.abs(one - many).max() < 2e-3 * many.max()
+
+
+def test_a_streak_ends_at_solid_things():
+    places = np.array([[1.5, 0.0, -1.0]])
+    seen = shone(places, square(1.0), spark(np.array([[3.0, 0, 0]])))
+    wall = shone(places, square(1.0))
+    within = np.s_[50:70, 80 - int(0.8 * SCALE) : 80 + int(0.8 * SCALE)]
+    assert np.abs(seen - wall)[within].max() < 1e-5
+    assert (seen - wall)[60, 80 + int(1.2 * SCALE), 0] > 0.01
+
+
+def puff(alpha=0.5, radius=0.5, color=(0.5, 0.5, 0.5), **more):
+    return Points(name="p", radius=radius, color=(*color, alpha), soft=True, **more)
+
+
+def test_a_puff_lets_a_share_through():
+    wall = (0.8, 0.1, 0.1, 1.0)
+    behind = shone(np.zeros((1, 3)), square(4.0, -2.0, wall), style=Style(shadows=False, bloom=0, pool=0))[60, 80]
+    alone = shone(np.zeros((1, 3)), puff(), style=BLACK)[60, 80]
+    both = shone(np.zeros((1, 3)), square(4.0, -2.0, wall), puff(), style=Style(shadows=False, bloom=0, pool=0))[60, 80]
+    assert both == pytest.approx(alone + 0.5 * behind, abs=0.01)
+
+
+@pytest.mark.parametrize(("z", "share"), [(2.0, 1.0), (0.0, 0.5), (-2.0, 0.0)])
+def test_a_puff_is_soft_where_it_meets_something_solid(z, share):
+    style = Style(bottom=(0, 0, 0), top=(0, 0, 0), bloom=0, pool=0, shadows=False)
+    place, wall = np.array([[0, 0, z]]), square(4.0, 0.0, (0.0, 0.0, 0.0, 1.0))
+    free, met, dark = (shone(place, *d, style=style)[60, 80] for d in ((puff(),), (wall, puff()), (wall,)))
+    assert met == pytest.approx(share * free + (1.0 - 0.5 * share) * dark, abs=0.01)
+
+
+def lit(places, alpha=0.5, normals=None, glows=None, style=None):
+    """Light that leaves the middles of grey sprites, shape (n, 3)."""
+    style = style or Style(light=(0, 1, 0), ambient=0.0, pool=0.0)
+    drawn = Points(name="p", radius=0.2, color=(1, 1, 1, alpha), soft=normals is None, normals=normals)
+    view = look(FRONT, SIZE)
+    rows = sprites(drawn, frame(places), view, 10.0).rows
+    light(rows, lamp(style, view, FRONT, no_shadow()), no_shadow(), np.zeros((0, 6)) if glows is None else glows)
+    return rows[:, 9:12]
+
+
+def test_puffs_take_each_others_light():
+    column = np.stack([np.zeros(12), np.linspace(2, -2, 12), np.zeros(12)], axis=1)
+    down = lit(column)[:, 0]
+    assert (np.diff(down) < 0).all()
+    assert down[-1] < 0.3 * down[0]
+    np.testing.assert_allclose(lit(column[::-1])[::-1, 0], down, rtol=1e-5)  # in whatever order they are given
+    apart = np.stack([np.linspace(-4, 4, 12), np.zeros(12), np.zeros(12)], axis=1)
+    np.testing.assert_allclose(lit(apart), lit(apart[:1])[0] * np.ones((12, 1)), rtol=1e-5)
+    thin = lit(column, alpha=0.01)[:, 0]
+    assert thin.min() > 0.85 * thin.max()
+
+
+def test_at_night_only_glows_light_smoke():
+    night = Style(bottom=(0, 0, 0), top=(0, 0, 0), bloom=0, pool=0)
+    assert shone(np.zeros((1, 3)), puff(daylight=0.0), style=night).max() == 0
+    half, whole = (shone(np.zeros((1, 3)), puff(daylight=d), style=night) for d in (0.5, 1.0))
+    np.testing.assert_allclose(half, 0.5 * whole, rtol=1e-5)
+
+
+def test_glows_light_smoke_by_the_square_of_the_distance():
+    places = np.array([[0.0, 0, 0], [3.0, 0, 0]])
+    dark = Style(light=(0, -1, 0), ambient=0.0, pool=0.0)
+    view = look(FRONT, SIZE)
+    near = np.column_stack([view.see(np.array([[0.0, 1.0, 0.0]])), [[0.3, 0.2, 0.1]]])
+    gained = lit(places, glows=near, style=dark) - lit(places, style=dark)
+    expected = np.array([[0.3, 0.2, 0.1]]) / np.array([[1.0 + 0.04], [10.0 + 0.04]])
+    np.testing.assert_allclose(gained, expected, rtol=1e-3)
+    # A thousand in a small place are as one.
+    many = np.repeat(near, 1000, axis=0) * np.array([1, 1, 1, 1e-3, 1e-3, 1e-3])
+    many[:, :3] += np.random.default_rng(1).normal(0, 0.01, (1000, 3))
+    np.testing.assert_allclose(lit(places, glows=many, style=dark) - lit(places, style=dark), expected, rtol=0.02)
+
+
+def test_smoke_is_the_same_in_any_order_of_drawing():
+    random = np.random.default_rng(5)
+    places = random.normal(0, 0.8, (300, 3))
+    shuffled = random.permutation(300)
+    one, other = (image(frame(p, puff(0.2, 0.4)), camera=FRONT, size=SIZE) for p in (places, places[shuffled]))
+    assert np.abs(one.astype(int) - other).max() <= 1
+
+
+@pytest.mark.parametrize(
+    ("normal", "wide", "high"), [((0, 0, 1), 1.0, 1.0), ((0.8, 0, 0.6), 0.6, 1.0), ((0, 1, 1), 1.0, 0.7)]
+)
+def test_flakes_are_discs_seen_at_a_slant(normal, wide, high):
+    flake = Points(name="f", radius=1.0, color=(0.6, 0.6, 0.6, 1.0), normals=np.array([normal], float))
+    seen = shone(np.zeros((1, 3)), flake, size=(320, 240))[:, :, 1]
+    covered = seen / seen.max()
+    assert covered.sum() == pytest.approx(math.pi * wide * high * (2 * SCALE) ** 2, rel=0.08)
+    rows, columns = np.nonzero(covered > 0.5)
+    assert np.ptp(columns) + 1 == pytest.approx(2 * wide * 2 * SCALE, abs=4)
+    assert np.ptp(rows) + 1 == pytest.approx(2 * high * 2 * SCALE, abs=4)
+
+
+def test_small_and_blurred_flakes_keep_their_light():
+    def total(radius, z=0.0):
+        flake = Points(name="f", radius=radius, color=(0.6, 0.6, 0.6, 1.0), normals=np.array([[0.0, 0, 1]]))
+        return shone(np.array([[0, 0, z]]), flake, size=(320, 240))[:, :, 1].sum()
+
+    assert total(0.01) / total(0.005) == pytest.approx(4.0, rel=0.05)
+    assert total(0.02, 8.0) / total(0.02) == pytest.approx(25.0, rel=0.2)  # near the eye it is large, and out of focus
+
+
+def test_a_puff_ends_at_its_reach():
+    seen = shone(np.zeros((1, 3)), puff(0.9, 1.0))[:, :, 1]
+    columns = np.flatnonzero(seen.max(axis=0) > 0)
+    assert np.ptp(columns) + 1 == pytest.approx(2 * PUFF * SCALE, abs=3)
+
+
+def test_sprites_with_nothing_and_with_numbers_that_are_not_finite():
+    bad = np.array([[0, 0, 0], [np.nan, 0, 0], [0, 0, 10.0], [0, 0, 40.0], [1e300, 0, 0]])
+    for more in ({"soft": True}, {"normals": np.zeros((5, 3))}, {"glow": True, "motion": bad}):
+        picture = image(frame(bad, Points(name="p", radius=0.2, **more)), camera=FRONT, size=SIZE)
+        assert picture.shape == (120, 160, 3)
+    for more in ({"soft": True}, {"normals": np.zeros((0, 3))}, {"glow": True, "motion": np.zeros((0, 3))}):
+        image(frame(np.zeros((0, 3)), Points(name="p", **more)), camera=FRONT, size=SIZE)
+
+
+@pytest.mark.parametrize("more", [{"normals": np.zeros((2, 3))}, {"glow": True, "motion": np.zeros((4, 3))}])
+def test_arrays_that_do_not_fit_are_named(more):
+    with pytest.raises(InvalidInput, match="'p' has 3 items"):
+        image(frame(np.zeros((3, 3)), Points(name="p", **more)), camera=FRONT, size=SIZE)
+
+
+def test_smoke_stands_in_the_shadow_of_solid_things():
+    roof = Triangles(
+        name="roof",
+        vertices=np.array([[-2, 2, -2], [2, 2, -2], [2, 2, 2], [-2, 2, 2]], float),
+        faces=np.array([[0, 1, 2], [0, 2, 3]]),
+    )
+    camera = Camera(position=(0.0, 0.0, 10.0), target=(0.0, 0.0, 0.0), fov=40.0)
+    style = Style(light=(0, 1, 0), bottom=(0, 0, 0), top=(0, 0, 0), bloom=0, pool=0, ambient=0.1)
+    shaded, free = (shone(np.zeros((1, 3)), *d, puff(), camera=camera, style=style) for d in ((roof,), ()))
+    assert shaded[60, 80, 1] < 0.5 * free[60, 80, 1]
