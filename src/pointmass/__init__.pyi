@@ -52,10 +52,31 @@ from .emitters import (
     EMITTERS as EMITTERS,
 )
 from .emitters import (
+    BoxEmitter as BoxEmitter,
+)
+from .emitters import (
     Emitter as Emitter,
 )
 from .emitters import (
+    LineEmitter as LineEmitter,
+)
+from .emitters import (
+    Normal as Normal,
+)
+from .emitters import (
     Nozzle as Nozzle,
+)
+from .emitters import (
+    PointEmitter as PointEmitter,
+)
+from .emitters import (
+    ShapedEmitter as ShapedEmitter,
+)
+from .emitters import (
+    SphereEmitter as SphereEmitter,
+)
+from .emitters import (
+    Spread as Spread,
 )
 from .errors import (
     Diverged as Diverged,

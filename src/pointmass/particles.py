@@ -191,6 +191,13 @@ class Particles:
         self.version += 1
         return ids
 
+    def declare(self, *names: str) -> None:
+        """Have these further columns, of zeros where they are new."""
+        for name in names:
+            if name not in self.attributes:
+                self.attributes[attribute_name(name)] = np.zeros(len(self), self.dtype)
+                self.version += 1
+
     def remove(self, which: Selection) -> None:
         """Take particles away; the others keep their order, ids and bits."""
         gone = np.zeros(len(self), bool)

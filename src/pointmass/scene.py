@@ -7,7 +7,7 @@ so a scene written in Python can be saved as text, and a text gives the same sce
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from pointmass.bodies import BODIES, Body, join
 from pointmass.collisions import COLLIDERS
 from pointmass.collisions.collider import Collider
 from pointmass.description import Described
-from pointmass.emitters import EMITTERS
+from pointmass.emitters import EMITTERS, Normal, Spread
 from pointmass.emitters.emitter import Emitter
 from pointmass.errors import InvalidInput, number, whole_number
 from pointmass.forces import FORCES, load_grid
@@ -108,12 +108,13 @@ class Scene:
         """
         copies = [Body(b.particles, [_again(f) for f in b.forces]) for b in self.bodies]
         particles, own = join(copies, self.names, np.dtype(self.dtype))
+        emitters = [_again(e) for e in self.emitters]
+        particles.declare(*(name for e in emitters for name in e.attributes_made))
         forces = [_again(f) for f in self.forces]
         for k, force in enumerate(forces):
             force.label = f"forces.{k} ({force.name})"
         system = ParticleSystem(particles, own + forces, [_again(c) for c in self.colliders])
         solver = None if self.solver is None else _again(self.solver)
-        emitters = [_again(e) for e in self.emitters]
         return Simulation(system, solver, self.dt, emitters=emitters, look=self.look, seed=self.seed)
 
     # ------------------------------------------------------------------------------------------------ as text
@@ -319,6 +320,8 @@ def _plain(value: Any, where: str, folder: Path | None) -> Any:
     """Numbers, strings, lists and tables only."""
     if isinstance(value, Grid):
         return _plain_grid(value, where, folder)
+    if isinstance(value, (Spread, Normal)):
+        return asdict(value)
     if isinstance(value, Described):
         return _table(FORCES, value, where, folder)
     if isinstance(value, (np.ndarray, np.generic)):
