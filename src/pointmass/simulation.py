@@ -282,10 +282,11 @@ class Simulation:
         new = [(k, birth) for births in born for k, birth in enumerate(births) if len(birth.number)]
         if not new:
             return None
-        clock = [np.full(len(self.system.particles), t0)]
-        for k, birth in new:
-            self.system.add(birth.x, birth.v, id=birth.ids(k), **birth.columns)
-            clock.append(np.maximum(birth.time, t0))
+        clock = [np.full(len(self.system.particles), t0), *(np.maximum(birth.time, t0) for _, birth in new)]
+        names = dict.fromkeys(name for _, birth in new for name in birth.columns)
+        columns = {name: np.concatenate([birth.column(name) for _, birth in new]) for name in names}
+        x, v = (np.concatenate([getattr(birth, name) for _, birth in new]) for name in "xv")
+        self.system.add(x, v, id=np.concatenate([birth.ids(k) for k, birth in new]), **columns)
         return np.concatenate(clock)
 
     def _started(self, clock: Array | None, t0: float) -> Array | None:

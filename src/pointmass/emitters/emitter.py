@@ -42,6 +42,10 @@ class Birth:
         """Ids that no other particle of the run has or will have."""
         return np.where(self.number < HASHED, (np.int64(emitter + 1) << CHILDREN) + self.number, self.number)
 
+    def column(self, name: str) -> Array:
+        """A column, of the number that particles have by default if the emitter does not set it, shape (k,)."""
+        return np.broadcast_to(self.columns.get(name, 1.0 if name == "m" else 0.0), self.time.shape)
+
     @property
     def death(self) -> Array:
         """When each dies [s], shape (k,)."""
