@@ -333,5 +333,17 @@ from .tracing.functions import (
 from .tracing.functions import (
     where as where,
 )
+from .zones import (
+    ZONES as ZONES,
+)
+from .zones import (
+    BoxZone as BoxZone,
+)
+from .zones import (
+    HalfSpaceZone as HalfSpaceZone,
+)
+from .zones import (
+    SphereZone as SphereZone,
+)
 
 __version__: str

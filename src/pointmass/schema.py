@@ -30,9 +30,16 @@ from pointmass.laws.unary import VelocityField
 from pointmass.look import Look
 from pointmass.simulation import DEFAULT_DT
 from pointmass.solvers import ALIASES, SOLVERS, find_solver
+from pointmass.zones import WHEN_FULL, ZONES
 
 VERSION = 1
-LISTS: dict[str, Mapping[str, Any]] = {"bodies": BODIES, "forces": FORCES, "colliders": COLLIDERS, "emitters": EMITTERS}
+LISTS: dict[str, Mapping[str, Any]] = {
+    "bodies": BODIES,
+    "forces": FORCES,
+    "colliders": COLLIDERS,
+    "emitters": EMITTERS,
+    "zones": ZONES,
+}
 DTYPES = ("float64", "float32")
 LARGEST = 2**63 - 1
 
@@ -123,6 +130,7 @@ def model() -> type[Table]:
     names: Any = Literal[(*SOLVERS, *ALIASES)]
     solver: Any = Union[names, _one_of("solver", tuple(SOLVERS))]  # noqa: UP007
     dtype: Any = Literal[DTYPES]
+    full: Any = Literal[WHEN_FULL]
     result = create_model(
         "Scene",
         __base__=Table,
@@ -134,6 +142,8 @@ def model() -> type[Table]:
         fps=(float, Field(default=60.0, gt=0, description="frames for a second of simulated time")),
         seed=(int, Field(default=0, ge=0, description="of all chance while it runs")),
         dtype=(dtype, Field(default=DTYPES[0], description="precision of the numbers")),
+        max_particles=(int, Field(default=None, ge=1, description="how many there may be; any number by default")),
+        when_full=(full, Field(default=WHEN_FULL[0], description="what happens beyond max_particles")),
         solver=(solver, Field(default=None, description="symplectic_euler by default, rk4 for a flow")),
         camera=(settings_model("camera"), Field(default={}, description="what a picture shows")),
         look=(settings_model("look"), Field(default={}, description="how it looks")),
@@ -147,6 +157,8 @@ def model() -> type[Table]:
         "fps": "a number greater than 0 [1/s]",
         "seed": "a whole number, at least 0",
         "dtype": "'float64' or 'float32'",
+        "max_particles": "a whole number, at least 1",
+        "when_full": "'no birth' or 'oldest dies'",
     }
     return result
 
@@ -250,6 +262,7 @@ _LIST_DOCS = {
     "forces": "that act on the particles, after the bodies' own",
     "colliders": "surfaces that particles bounce off",
     "emitters": "where particles come from",
+    "zones": "where particles die",
 }
 
 

@@ -14,7 +14,7 @@ from pointmass.emitters.emitter import Birth, Emitter
 from pointmass.engine.engine import Engine, compiled_by_default
 from pointmass.engine.island import Span
 from pointmass.engine.kernels import grow_old
-from pointmass.errors import Diverged, InvalidInput, number, shown, whole_number
+from pointmass.errors import Diverged, InvalidInput, number, shown, unknown, whole_number
 from pointmass.frame import Frame
 from pointmass.lineage import Lineage
 from pointmass.look import Look, Stage
@@ -24,6 +24,7 @@ from pointmass.solvers.advance import advance
 from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.control import control_of
 from pointmass.system import ParticleSystem
+from pointmass.zones import WHEN_FULL, WhenFull, Zone, oldest, with_room
 
 Born = list[list[Birth]]  # for each step, of each emitter
 
@@ -44,6 +45,10 @@ class Simulation:
     dt : the solver's step [s], on the grid t0 + k dt with whole k; 1/240 by default. An adaptive solver makes steps
         of its own in between. How often frames are looked at changes nothing.
     emitters : where particles come from.
+    zones : where particles die.
+    max_particles : how many there may be at the end of a step; None = any number.
+    when_full : what happens beyond them: "no birth", first come, first served; or "oldest dies", of those that emitters
+        have made.
     look : how frames look.
     seed : all chance comes from it.
     compiled : whether laws and solver are compiled to run at the speed of the machine (by default they are, unless the
@@ -76,6 +81,9 @@ class Simulation:
         dt: float = DEFAULT_DT,
         *,
         emitters: Sequence[Emitter] = (),
+        zones: Sequence[Zone] = (),
+        max_particles: int | None = None,
+        when_full: WhenFull = "no birth",
         look: Look | None = None,
         seed: int = 0,
         compiled: bool | None = None,
@@ -91,6 +99,16 @@ class Simulation:
             if not isinstance(emitter, Emitter):
                 raise InvalidInput(f"emitters must be emitters, such as pm.Nozzle(), not {emitter!r}")
             system.particles.declare(*emitter.attributes_made)
+        self.zones = list(zones)
+        for zone in self.zones:
+            if not isinstance(zone, Zone):
+                raise InvalidInput(f"zones must be zones, such as pm.SphereZone(), not {shown(zone)}")
+        self.max_particles = None
+        if max_particles is not None:
+            self.max_particles = whole_number("max_particles", max_particles, at_least=1)
+        if when_full not in WHEN_FULL:
+            raise unknown("value of when_full:", when_full, WHEN_FULL)
+        self.when_full = when_full
         self.look = look or Look()
         self.t0 = system.t
         self.steps = 0
@@ -217,7 +235,8 @@ class Simulation:
         if not self.engine.compiled:
             self._step()
             return
-        single = (self.emitters or len(self._mortal)) and self.engine.coupled
+        changes = self.emitters or len(self._mortal)
+        single = (changes and self.engine.coupled) or self.zones or self.max_particles is not None
         span = Span(self.t0, self.dt, self.steps, 1 if single else min(most, self.engine.longest()))
         try:
             born = self._born(span, compiled=True)
@@ -275,7 +294,11 @@ class Simulation:
     def _born(self, span: Span, compiled: bool) -> Born:
         """Who is born in each step of a span, of each emitter."""
         born = [self.births(span.first + k) for k in range(span.count)]
-        return self._lineage.foresee(self.engine, span, born, compiled, self.seed, self._streams)
+        born = self._lineage.foresee(self.engine, span, born, compiled, self.seed, self._streams)
+        if self.max_particles is not None and self.when_full == "no birth":
+            room = self.max_particles - len(self.system.particles)
+            born = [with_room(births, self._lineage.order, room) for births in born]
+        return born
 
     def _bear(self, born: Born, t0: float) -> Array | None:
         """Add the particles that are born from t0 on; returns the clock of all particles, None if all begin at t0."""
@@ -312,18 +335,24 @@ class Simulation:
             age += np.asarray(t1 - (t0 if clock is None else np.clip(clock, t0, t1)), age.dtype)
 
     def _bury(self, born: Born, t1: float) -> None:
-        """Take away those whose time has come by t1."""
+        """Take away those whose time has come by t1, who are in a zone, and who are too many."""
         for k, birth in ((k, birth) for births in born for k, birth in enumerate(births)):
             mortal = np.isfinite(birth.lifetime)
             if mortal.any():
                 self._mortal = np.append(self._mortal, birth.ids(k)[mortal])
                 self._death = np.append(self._death, birth.death[mortal])
         self._lineage.settle(born, t1)
-        dead = self._death <= t1
-        if dead.any():
-            rows = self.system.particles.rows(self._mortal[dead])
-            self.system.remove(rows[rows >= 0])
-            self._mortal, self._death = self._mortal[~dead], self._death[~dead]
+        p, dead = self.system.particles, self._death <= t1
+        rows = p.rows(self._mortal[dead])
+        gone = np.zeros(len(p), bool)
+        gone[rows[rows >= 0]] = True
+        self._mortal, self._death = self._mortal[~dead], self._death[~dead]
+        for zone in self.zones:
+            gone |= zone.kills(p.x, t1)
+        if gone.any():
+            self.system.remove(gone)
+        if self.max_particles is not None and len(p) > self.max_particles:
+            self.system.remove(oldest(p, len(p) - self.max_particles))
 
     def _frames(self, count: int, fps: float) -> Iterator[Frame]:
         for _ in range(count):

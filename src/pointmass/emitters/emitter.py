@@ -42,6 +42,12 @@ class Birth:
         """Ids that no other particle of the run has or will have."""
         return np.where(self.number < HASHED, (np.int64(emitter + 1) << CHILDREN) + self.number, self.number)
 
+    def take(self, rows: NDArray[np.intp]) -> Birth:
+        """Some of them."""
+        columns = {name: self.column(name)[rows] for name in self.columns}
+        arrays = (self.time[rows], self.number[rows], self.x[rows], self.v[rows], self.lifetime[rows])
+        return Birth(*arrays, columns)
+
     def column(self, name: str) -> Array:
         """A column, of the number that particles have by default if the emitter does not set it, shape (k,)."""
         return np.broadcast_to(self.columns.get(name, 1.0 if name == "m" else 0.0), self.time.shape)
