@@ -183,7 +183,9 @@ def capsule():
     scene = pm.Scene(
         dt=1 / 120,
         solver=pm.Leapfrog(),
-        emitters=[pm.Nozzle((0.35, 2.0, 0), (0, -1, 0), rate=500.0, speed=2.0, cone=6.0, radius=0.1, lifetime=1.6)],
+        emitters=[
+            pm.Nozzle((0.35, 2.0, 0), direction=(0, -1, 0), rate=500.0, speed=2.0, cone=6.0, radius=0.1, lifetime=1.6)
+        ],
         forces=[pm.Gravity()],
         colliders=[rail, pm.Plane(restitution=0.3)],
         look=pm.Look(particles="glow", size=0.018, color_by="speed", trails=0.06, floor_size=40.0),

@@ -263,6 +263,17 @@ def test_a_flow_that_carries_away_has_not_diverged():
 # ---------------------------------------------------------------------------------------------------- memory
 
 
+def test_births_do_not_hold_up_those_that_they_act_on():
+    p = pm.Particles([[0, 0, 0], [5, 0, 0]], v=(1, 0, 0))
+    nozzle = pm.Nozzle((0, 50, 0), rate=7, speed=20, cone=0)
+    sim = pm.Simulation(pm.ParticleSystem(p, [pm.SoftSphere()]), "leapfrog", 0.1, emitters=[nozzle], compiled=False)
+    sim.step(10)
+    age = 1 - np.arange(7) / 7
+    np.testing.assert_allclose(p.x[:2, 0], [1, 6], rtol=1e-12)
+    np.testing.assert_allclose(p.age[2:], age, rtol=1e-12)
+    np.testing.assert_allclose(p.x[2:, 1], 50 + 20 * age, rtol=1e-12)
+
+
 @pytest.mark.parametrize("name", ["bdf2", "dopri5"])
 def test_memory_follows_particles_over_births_and_deaths(name):
     # A particle that nothing links to others moves as if it were alone.

@@ -52,10 +52,31 @@ from .emitters import (
     EMITTERS as EMITTERS,
 )
 from .emitters import (
+    BoxEmitter as BoxEmitter,
+)
+from .emitters import (
     Emitter as Emitter,
 )
 from .emitters import (
+    LineEmitter as LineEmitter,
+)
+from .emitters import (
+    Normal as Normal,
+)
+from .emitters import (
     Nozzle as Nozzle,
+)
+from .emitters import (
+    PointEmitter as PointEmitter,
+)
+from .emitters import (
+    ShapedEmitter as ShapedEmitter,
+)
+from .emitters import (
+    SphereEmitter as SphereEmitter,
+)
+from .emitters import (
+    Spread as Spread,
 )
 from .errors import (
     Diverged as Diverged,
@@ -311,6 +332,18 @@ from .tracing.functions import (
 )
 from .tracing.functions import (
     where as where,
+)
+from .zones import (
+    ZONES as ZONES,
+)
+from .zones import (
+    BoxZone as BoxZone,
+)
+from .zones import (
+    HalfSpaceZone as HalfSpaceZone,
+)
+from .zones import (
+    SphereZone as SphereZone,
 )
 
 __version__: str

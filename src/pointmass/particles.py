@@ -210,6 +210,13 @@ class Particles:
         self.version += 1
         return ids
 
+    def declare(self, *names: str) -> None:
+        """Have these further columns, of zeros where they are new."""
+        for name in names:
+            if name not in self.attributes:
+                self.attributes[attribute_name(name)] = np.zeros(len(self), self.dtype)
+                self.version += 1
+
     def remove(self, which: Selection) -> None:
         """Take particles away; the others keep their order, ids and bits."""
         gone = np.zeros(len(self), bool)
@@ -279,12 +286,14 @@ class Particles:
     def rows(self, ids: ArrayLike) -> NDArray[np.intp]:
         """Row of each id; -1 where that particle is gone."""
         ids = np.asarray(ids)
-        if len(self) == 0:
+        asked, which = np.unique(ids, return_inverse=True)
+        if not len(asked):
             return np.full(ids.shape, -1)
-        order = np.argsort(self.id, kind="stable")
-        place = np.minimum(np.searchsorted(self.id, ids, sorter=order), len(self) - 1)
-        rows = order[place]
-        return np.where(self.id[rows] == ids, rows, -1)
+        place = np.minimum(np.searchsorted(asked, self.id), len(asked) - 1)  # of many particles few are asked for
+        here = np.flatnonzero(asked[place] == self.id)
+        rows = np.full(len(asked), -1)
+        rows[place[here]] = here
+        return rows[which].reshape(ids.shape)
 
     def column(self, name: str) -> Array:
         """A column of numbers by name: m, radius, age, lifetime or a further attribute, shape (n,)."""
@@ -306,7 +315,7 @@ class Particles:
         if given.size and given.dtype.kind not in "iu":
             given = np.zeros(0)
         result = given.astype(np.int64)
-        if result.shape != (n,) or len(np.unique(result)) != n or np.isin(result, self.id).any():
+        if result.shape != (n,) or len(np.unique(result)) != n or (self.rows(result) >= 0).any():
             raise InvalidInput(f"id must be {n} whole numbers that no other particle has")
         return result
 

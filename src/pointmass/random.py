@@ -32,6 +32,27 @@ def philox(counter: tuple[Any, Any, Any, Any], key: tuple[Any, Any]) -> tuple[An
     return a, b, c, d
 
 
+def words(seed: int, stream: str, ids: ArrayLike, third: Any) -> tuple[Any, Any, Any, Any]:
+    """Four random words of 32 bits for each id; `third` says what for, 32 bits."""
+    ids = np.asarray(ids).astype(np.uint64)
+    bits = seed % 2**64
+    counter = (ids & MASK, ids >> SHIFT, third, crc32(stream.encode()))
+    return philox(counter, (bits & 0xFFFFFFFF, bits >> 32))
+
+
+def hashed(seed: int, stream: str, ids: ArrayLike, child: ArrayLike) -> NDArray[np.int64]:
+    """Ids of children, at least 2^62, from those of their parents and their numbers among a parent's children.
+
+    Parameters
+    ----------
+    stream : who makes them.
+    child : of each, at least 0 and less than 2^32.
+    """
+    high, low, _, _ = words(seed, f"{stream} child", ids, child)
+    result: NDArray[np.int64] = ((((high << SHIFT) | low) >> np.uint64(2)) | np.uint64(2**62)).astype(np.int64)
+    return result
+
+
 def uniform(seed: int, stream: str, ids: ArrayLike, purpose: str) -> Array:
     """Two numbers in [0, 1) for each id, shape (*ids.shape, 2).
 
@@ -42,11 +63,8 @@ def uniform(seed: int, stream: str, ids: ArrayLike, purpose: str) -> Array:
     ids : for whom, whole numbers of 64 bits.
     purpose : what for, such as "speed": other purposes give independent numbers.
     """
-    ids = np.asarray(ids).astype(np.uint64)
-    counter = (ids & MASK, ids >> SHIFT, crc32(purpose.encode()), crc32(stream.encode()))
-    bits = seed % 2**64
-    words = philox(counter, (bits & 0xFFFFFFFF, bits >> 32))
-    pairs = ((words[0] << SHIFT) | words[1], (words[2] << SHIFT) | words[3])
+    a, b, c, d = words(seed, stream, ids, crc32(purpose.encode()))
+    pairs = ((a << SHIFT) | b, (c << SHIFT) | d)
     return np.stack([(p >> np.uint64(11)).astype(np.float64) * 2.0**-53 for p in pairs], axis=-1)
 
 
@@ -64,7 +82,11 @@ def normal(seed: int, stream: str, ids: ArrayLike, purpose: str) -> Array:
 
 def direction(seed: int, stream: str, ids: ArrayLike, purpose: str) -> Array:
     """A direction for each id, even over the sphere, shape (*ids.shape, 3)."""
-    u = uniform(seed, stream, ids, purpose)
+    return on_sphere(uniform(seed, stream, ids, purpose))
+
+
+def on_sphere(u: NDArray[np.floating[Any]]) -> Array:
+    """Unit vectors, shape (*s, 3), that are even over the sphere if u is even over [0, 1)^2, shape (*s, 2)."""
     height, angle = 2.0 * u[..., 0] - 1.0, 2.0 * np.pi * u[..., 1]
     radius = np.sqrt(1.0 - height * height)
     return np.stack([radius * fn.cos(angle), height, radius * fn.sin(angle)], axis=-1)

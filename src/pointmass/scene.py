@@ -7,7 +7,7 @@ so a scene written in Python can be saved as text, and a text gives the same sce
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +17,9 @@ from pointmass.bodies import BODIES, Body, join
 from pointmass.collisions import COLLIDERS
 from pointmass.collisions.collider import Collider
 from pointmass.description import Described
-from pointmass.emitters import EMITTERS
+from pointmass.emitters import EMITTERS, Normal, Spread
 from pointmass.emitters.emitter import Emitter
-from pointmass.errors import InvalidInput, number, whole_number
+from pointmass.errors import InvalidInput, number, unknown, whole_number
 from pointmass.forces import FORCES, load_grid
 from pointmass.frame import Camera
 from pointmass.laws.force import Force
@@ -31,11 +31,18 @@ from pointmass.solvers import SOLVERS, find_solver
 from pointmass.solvers.base import Solver
 from pointmass.system import ParticleSystem
 from pointmass.toml import dumps
+from pointmass.zones import WHEN_FULL, ZONES, WhenFull, Zone
 
 VERSION = 1
-LISTS: dict[str, Mapping[str, Any]] = {"bodies": BODIES, "forces": FORCES, "colliders": COLLIDERS, "emitters": EMITTERS}
-HOLDS: dict[str, type] = {"bodies": Body, "forces": Force, "colliders": Collider, "emitters": Emitter}
-PLAIN = ("name", "summary", "dt", "frames", "fps", "seed", "dtype")
+LISTS: dict[str, Mapping[str, Any]] = {
+    "bodies": BODIES,
+    "forces": FORCES,
+    "colliders": COLLIDERS,
+    "emitters": EMITTERS,
+    "zones": ZONES,
+}
+HOLDS: dict[str, type] = {"bodies": Body, "forces": Force, "colliders": Collider, "emitters": Emitter, "zones": Zone}
+PLAIN = ("name", "summary", "dt", "frames", "fps", "seed", "dtype", "max_particles", "when_full")
 
 
 @dataclass(kw_only=True)
@@ -47,12 +54,14 @@ class Scene:
     bodies : what there is at the start; names make groups that forces can act on.
     names : of the bodies; by default their kind, numbered where it occurs twice.
     forces : on all particles, after the bodies' own.
-    colliders, emitters : surfaces and sources.
+    colliders, emitters, zones : surfaces, where particles come from, and where they die.
     solver : None = SymplecticEuler, or RK4 for a flow.
     dt : the solver's step [s].
     frames, fps : length of the run, and looks per second, where nothing else is asked for.
     seed : of all chance while it runs.
     dtype : "float64" or "float32".
+    max_particles, when_full : how many particles there may be, None = any number, and what happens beyond them: see
+        `Simulation`.
     camera, look : what a picture shows.
     name, summary : for people.
 
@@ -69,12 +78,15 @@ class Scene:
     fps: float = 60.0
     seed: int = 0
     dtype: str = "float64"
+    max_particles: int | None = None
+    when_full: WhenFull = "no birth"
     solver: Solver | None = None
     bodies: Sequence[Body] = ()
     names: Sequence[str] = ()
     forces: Sequence[Force] = ()
     colliders: Sequence[Collider] = ()
     emitters: Sequence[Emitter] = ()
+    zones: Sequence[Zone] = ()
     camera: Camera = field(default_factory=Camera)
     look: Look = field(default_factory=Look)
 
@@ -85,6 +97,10 @@ class Scene:
         self.seed = whole_number("seed", self.seed, at_least=0)
         if self.dtype not in ("float64", "float32"):
             raise InvalidInput(f"dtype = {self.dtype!r} is not allowed: it must be float64 or float32")
+        if self.max_particles is not None:
+            self.max_particles = whole_number("max_particles", self.max_particles, at_least=1)
+        if self.when_full not in WHEN_FULL:
+            raise unknown("value of when_full:", self.when_full, WHEN_FULL)
         for what, kind in HOLDS.items():
             setattr(self, what, _items(what, kind, getattr(self, what)))
         if self.solver is not None and not isinstance(self.solver, Solver):
@@ -108,13 +124,24 @@ class Scene:
         """
         copies = [Body(b.particles, [_again(f) for f in b.forces]) for b in self.bodies]
         particles, own = join(copies, self.names, np.dtype(self.dtype))
+        emitters = [_again(e) for e in self.emitters]
+        particles.declare(*(name for e in emitters for name in e.attributes_made))
         forces = [_again(f) for f in self.forces]
         for k, force in enumerate(forces):
             force.label = f"forces.{k} ({force.name})"
         system = ParticleSystem(particles, own + forces, [_again(c) for c in self.colliders])
         solver = None if self.solver is None else _again(self.solver)
-        emitters = [_again(e) for e in self.emitters]
-        return Simulation(system, solver, self.dt, emitters=emitters, look=self.look, seed=self.seed)
+        return Simulation(
+            system,
+            solver,
+            self.dt,
+            emitters=emitters,
+            zones=[_again(z) for z in self.zones],
+            max_particles=self.max_particles,
+            when_full=self.when_full,
+            look=self.look,
+            seed=self.seed,
+        )
 
     # ------------------------------------------------------------------------------------------------ as text
 
@@ -321,6 +348,8 @@ def _plain(value: Any, where: str, folder: Path | None) -> Any:
     """Numbers, strings, lists and tables only."""
     if isinstance(value, Grid):
         return _plain_grid(value, where, folder)
+    if isinstance(value, (Spread, Normal)):
+        return asdict(value)
     if isinstance(value, Described):
         return _table(FORCES, value, where, folder)
     if isinstance(value, (np.ndarray, np.generic)):

@@ -12,7 +12,7 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import asdict, fields, is_dataclass
 from functools import cache
 from inspect import Parameter
 from typing import Annotated, Any, ClassVar, Literal, Union
@@ -30,9 +30,16 @@ from pointmass.laws.unary import VelocityField
 from pointmass.look import OF_PARTICLES, Look
 from pointmass.simulation import DEFAULT_DT
 from pointmass.solvers import ALIASES, SOLVERS, find_solver
+from pointmass.zones import WHEN_FULL, ZONES
 
 VERSION = 1
-LISTS: dict[str, Mapping[str, Any]] = {"bodies": BODIES, "forces": FORCES, "colliders": COLLIDERS, "emitters": EMITTERS}
+LISTS: dict[str, Mapping[str, Any]] = {
+    "bodies": BODIES,
+    "forces": FORCES,
+    "colliders": COLLIDERS,
+    "emitters": EMITTERS,
+    "zones": ZONES,
+}
 DTYPES = ("float64", "float32")
 LARGEST = 2**63 - 1
 MAY_LAST = re.compile(r"emitters\.|bodies\.\d+\.lifetime")  # values that may be infinite
@@ -58,20 +65,43 @@ class GridTable(Table):
     }
 
 
+class SpreadTable(Table):
+    """mean +- half_range, each value in between equally likely."""
+
+    mean: float
+    half_range: float
+
+
+class NormalTable(Table):
+    """A normal distribution."""
+
+    mean: float
+    sd: float
+
+
 def _exactly(count: int, kind: Any) -> Any:
     return Annotated[list[kind], Field(min_length=count, max_length=count)]
 
 
 Row = list[float | str]
+CHANCE = float | SpreadTable | NormalTable
+SPREAD = "{ mean = 5, half_range = 0.5 } or { mean = 5, sd = 0.5 }"
 BOX = "tuple[tuple[float, float, float], tuple[float, float, float]]"
 SCALAR = (float | str | list[float], "a number, a formula in quotes, or a list of numbers")
 VECTOR = (Row | list[list[float]], "three numbers or formulas, such as [0, -9.81, 0]")
 FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's parameter, without "| None"
     "Any": (float | str | list[float | str | Row], "a number, or a list of numbers or formulas"),
     "ArrayLike": (list[list[int]], "a list of lists of particle ids, such as [[0, 1], [1, 2]]"),
+    "Axis": (Row | str, "three numbers, such as [0, 1, 0], or 'normal'"),
+    "Chance": (CHANCE, f"a number, or {SPREAD}"),
     "Grid | str": (str | GridTable, "the path of a file, or a table with its path"),
+    "Rate": (float | str, "a number, or a formula of t in quotes"),
     "Scalar": SCALAR,
     "Selection": (str | list[int] | list[bool], "the name of a body or group, or a list of rows"),
+    "Sequence[tuple[float, int]]": (
+        list[_exactly(2, float)],  # type: ignore[misc]
+        "a list of times and counts, such as [[0, 100], [0.5, 200]]",
+    ),
     "Vector": VECTOR,
     "Color": (str | float, "a colour, such as orange or #ffb454, or a temperature [K]"),
     "Curve": (
@@ -85,6 +115,7 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
     BOX: (_exactly(2, _exactly(3, float)), "two corners, such as [[0, 0, 0], [1, 1, 1]]"),
     "bool": (bool, "true or false"),
     "dict[str, Any]": (dict[str, float | list[float]], "a table of numbers, or of lists of numbers"),
+    "dict[str, Chance]": (dict[str, CHANCE], f"a table of numbers, or of {SPREAD}"),
     "dict[str, Scalar]": (dict[str, float | str | list[float]], "a table of numbers or formulas"),
     "float": (float, "a number"),
     "int": (int, "a whole number"),
@@ -92,7 +123,11 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
 }
 UNKNOWN = (Any, "another value")
 FLOW_OR_VECTOR = "Vector | VelocityField"
-SHORT = {"Contact": "Literal['swept', 'discrete']"}
+SHORT = {
+    "Contact": "Literal['swept', 'discrete']",
+    "Event": "Literal['death', 'birth', 'trail']",
+    "Where": "Literal['surface', 'volume']",
+}
 
 
 @cache
@@ -105,6 +140,7 @@ def model() -> type[Table]:
     names: Any = Literal[(*SOLVERS, *ALIASES)]
     solver: Any = Union[names, _one_of("solver", tuple(SOLVERS))]  # noqa: UP007
     dtype: Any = Literal[DTYPES]
+    full: Any = Literal[WHEN_FULL]
     result = create_model(
         "Scene",
         __base__=Table,
@@ -116,6 +152,8 @@ def model() -> type[Table]:
         fps=(float, Field(default=60.0, gt=0, description="frames for a second of simulated time")),
         seed=(int, Field(default=0, ge=0, description="of all chance while it runs")),
         dtype=(dtype, Field(default=DTYPES[0], description="precision of the numbers")),
+        max_particles=(int, Field(default=None, ge=1, description="how many there may be; any number by default")),
+        when_full=(full, Field(default=WHEN_FULL[0], description="what happens beyond max_particles")),
         solver=(solver, Field(default=None, description="symplectic_euler by default, rk4 for a flow")),
         camera=(settings_model("camera"), Field(default={}, description="what a picture shows")),
         look=(settings_model("look"), Field(default={}, description="how it looks")),
@@ -129,6 +167,8 @@ def model() -> type[Table]:
         "fps": "a number greater than 0 [1/s]",
         "seed": "a whole number, at least 0",
         "dtype": "'float64' or 'float32'",
+        "max_particles": "a whole number, at least 1",
+        "when_full": "'no birth' or 'oldest dies'",
     }
     return result
 
@@ -219,10 +259,15 @@ def form_of(annotation: str) -> tuple[Any, str]:
 
 
 def documented(factory: Any) -> dict[str, str]:
-    """What the docstring of a class or function says about each of its parameters, one sentence each."""
+    """What the docstring of a class or function says about each of its parameters, one sentence each.
+
+    A dataclass has the parameters of its bases too.
+    """
     result: dict[str, str] = {}
     names: list[str] = []
-    for line in (inspect.getdoc(factory) or "").splitlines():
+    bases = factory.__mro__ if is_dataclass(factory) and isinstance(factory, type) else ()
+    told = [base for base in reversed(bases) if is_dataclass(base)] or [factory]
+    for line in "\n\n".join(inspect.getdoc(each) or "" for each in told).splitlines():
         entry = re.fullmatch(r"(\w+(?:, \w+)*) : (.+)", line)
         if entry:
             names = entry[1].split(", ")
@@ -241,6 +286,7 @@ _LIST_DOCS = {
     "forces": "that act on the particles, after the bodies' own",
     "colliders": "surfaces that particles bounce off",
     "emitters": "where particles come from",
+    "zones": "where particles die",
 }
 
 
@@ -260,6 +306,8 @@ def _plain_default(value: Any) -> Any:
     """A default as JSON can hold it; None stands for everything else, and for "not given"."""
     if isinstance(value, (tuple, list)):
         return list(value)
+    if is_dataclass(value) and not isinstance(value, type):
+        return asdict(value)
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

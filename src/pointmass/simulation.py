@@ -14,8 +14,9 @@ from pointmass.emitters.emitter import Birth, Emitter
 from pointmass.engine.engine import Engine, compiled_by_default
 from pointmass.engine.island import Span
 from pointmass.engine.kernels import grow_old
-from pointmass.errors import Diverged, InvalidInput, number, shown, whole_number
+from pointmass.errors import Diverged, InvalidInput, number, shown, unknown, whole_number
 from pointmass.frame import Frame
+from pointmass.lineage import Lineage
 from pointmass.look import Look, Stage
 from pointmass.particles import Array
 from pointmass.solvers import as_solver
@@ -23,6 +24,9 @@ from pointmass.solvers.advance import advance
 from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.control import control_of
 from pointmass.system import ParticleSystem
+from pointmass.zones import WHEN_FULL, WhenFull, Zone, oldest, with_room
+
+Born = list[list[Birth]]  # for each step, of each emitter
 
 DEFAULT_DT = 1 / 240  # 60 frames a second with 4 substeps
 RUNAWAY = 1e6  # times the speeds seen so far that are explained: somebody this fast is looked at
@@ -41,6 +45,10 @@ class Simulation:
     dt : the solver's step [s], on the grid t0 + k dt with whole k; 1/240 by default. An adaptive solver makes steps
         of its own in between. How often frames are looked at changes nothing.
     emitters : where particles come from.
+    zones : where particles die.
+    max_particles : how many there may be at the end of a step; None = any number.
+    when_full : what happens beyond them: "no birth", first come, first served; or "oldest dies", of those that emitters
+        have made.
     look : how frames look.
     seed : all chance comes from it.
     compiled : whether laws and solver are compiled to run at the speed of the machine (by default they are, unless the
@@ -73,6 +81,9 @@ class Simulation:
         dt: float = DEFAULT_DT,
         *,
         emitters: Sequence[Emitter] = (),
+        zones: Sequence[Zone] = (),
+        max_particles: int | None = None,
+        when_full: WhenFull = "no birth",
         look: Look | None = None,
         seed: int = 0,
         compiled: bool | None = None,
@@ -87,6 +98,17 @@ class Simulation:
         for emitter in self.emitters:
             if not isinstance(emitter, Emitter):
                 raise InvalidInput(f"emitters must be emitters, such as pm.Nozzle(), not {emitter!r}")
+            system.particles.declare(*emitter.attributes_made)
+        self.zones = list(zones)
+        for zone in self.zones:
+            if not isinstance(zone, Zone):
+                raise InvalidInput(f"zones must be zones, such as pm.SphereZone(), not {shown(zone)}")
+        self.max_particles = None
+        if max_particles is not None:
+            self.max_particles = whole_number("max_particles", max_particles, at_least=1)
+        if when_full not in WHEN_FULL:
+            raise unknown("value of when_full:", when_full, WHEN_FULL)
+        self.when_full = when_full
         self.look = look or Look()
         self.t0 = system.t
         self.steps = 0
@@ -94,6 +116,7 @@ class Simulation:
         self.engine = Engine(system, self.solver, compiled_by_default() if compiled is None else compiled)
         for reason in self.engine.missing() if self.engine.wanted else ():
             warnings.warn(f"this run is not compiled, because {reason}", stacklevel=2)
+        self._lineage = Lineage(self.emitters)
         self._start = system.get_state()
         self._stage = Stage(self.look, system.particles.x)
         self._looks = self.t0, 0, 1.0  # time of a frame, how many were looked at from it on, and how many in a second
@@ -184,9 +207,9 @@ class Simulation:
         )
 
     def births(self, step: int) -> list[Birth]:
-        """Who is born in a step, of each emitter; nothing is changed."""
+        """Who is born in a step without parents, of each emitter; nothing is changed."""
         t0, t1 = self._grid(step), self._grid(step + 1)
-        return [e.births(t0, t1, self.seed, f"{type(e).__name__} {k}") for k, e in enumerate(self.emitters)]
+        return [e.births(t0, t1, self.seed, stream) for e, stream in zip(self.emitters, self._streams, strict=True)]
 
     def quantities(self) -> dict[str, float]:
         """Diagnostics now: energies [J], momentum [kg m/s], largest relative stretch of a spring, particle count."""
@@ -214,30 +237,43 @@ class Simulation:
         if not self.engine.compiled:
             self._step()
             return
-        single = (self.emitters or len(self._mortal)) and self.engine.coupled
+        changes = self.emitters or len(self._mortal)
+        single = (changes and self.engine.coupled) or self.zones or self.max_particles is not None
         span = Span(self.t0, self.dt, self.steps, 1 if single else min(most, self.engine.longest()))
-        born = [birth for k in range(span.count) for birth in enumerate(self.births(span.first + k))]
+        try:
+            born = self._born(span, compiled=True)
+        except Diverged:
+            self._stepwise(span)
+            return
         old = len(self.system.particles)
         clock = self._bear(born, span.start)
-        if self.engine.run(span, clock, look_inside) and self._slow_enough():
+        if self.engine.run(span, self._started(clock, span.start), look_inside) and self._slow_enough():
             self._age(span, clock)
             self.steps += span.count
             self._bury(born, span.end)
             return
         self.engine.restore()
         self.system.remove(np.arange(old, len(self.system.particles)))
-        for _ in range(span.count):  # step by step, to see what it is and where
+        self._stepwise(span)
+
+    def _stepwise(self, span: Span) -> None:
+        """Make a span step by step, to see what goes wrong and where."""
+        for _ in range(span.count):
             self._step()
 
     def _step(self) -> None:
         """One step on the reference path."""
         span = Span(self.t0, self.dt, self.steps, 1)
         old = len(self.system.particles)
-        born = list(enumerate(self.births(self.steps)))
+        try:
+            born = self._born(span, compiled=False)
+        except Diverged as error:
+            raise self._explained(error) from error
         clock = self._bear(born, span.start)
+        start = self._started(clock, span.start)
         before = self.system.get_state()
         try:
-            self.engine.step(span, clock)
+            self.engine.step(span, start)
             self._check_speed(before)
         except Diverged as error:
             self.system.set_state(before, span.start)
@@ -252,17 +288,44 @@ class Simulation:
         self.steps += 1
         self._bury(born, span.end)
 
-    def _bear(self, born: Sequence[tuple[int, Birth]], t0: float) -> Array | None:
-        """Add the particles that are born from t0 on, each with the number of its emitter; returns the clock of all
-        particles, None if all begin at t0."""
-        if not any(len(birth.number) for _, birth in born):
+    @property
+    def _streams(self) -> list[str]:
+        """Names of the emitters, by which each has a chance of its own."""
+        return [f"{type(e).__name__} {k}" for k, e in enumerate(self.emitters)]
+
+    def _born(self, span: Span, compiled: bool) -> Born:
+        """Who is born in each step of a span, of each emitter."""
+        born = [self.births(span.first + k) for k in range(span.count)]
+        born = self._lineage.foresee(self.engine, span, born, compiled, self.seed, self._streams)
+        if self.max_particles is not None and self.when_full == "no birth":
+            room = self.max_particles - len(self.system.particles)
+            born = [with_room(births, self._lineage.order, room) for births in born]
+        return born
+
+    def _bear(self, born: Born, t0: float) -> Array | None:
+        """Add the particles that are born from t0 on; returns the clock of all particles, None if all begin at t0."""
+        new = [(k, birth) for births in born for k, birth in enumerate(births) if len(birth.number)]
+        if not new:
             return None
-        clock = [np.full(len(self.system.particles), t0)]
-        for k, birth in born:
-            if len(birth.number):
-                self.system.add(birth.x, birth.v, lifetime=birth.lifetime, id=birth.ids(k), **birth.columns)
-                clock.append(np.maximum(birth.time, t0))
+        clock = [np.full(len(self.system.particles), t0), *(np.maximum(birth.time, t0) for _, birth in new)]
+        names = dict.fromkeys(name for _, birth in new for name in birth.columns)
+        columns = {name: np.concatenate([birth.column(name) for _, birth in new]) for name in names}
+        x, v, lifetime = (np.concatenate([getattr(b, name) for _, b in new]) for name in ("x", "v", "lifetime"))
+        self.system.add(x, v, lifetime=lifetime, id=np.concatenate([birth.ids(k) for k, birth in new]), **columns)
         return np.concatenate(clock)
+
+    def _started(self, clock: Array | None, t0: float) -> Array | None:
+        """The clock at which each particle begins to move; None if all do at t0.
+
+        Those whom others act on all move from t0 on: who is born later among them starts so far back on a straight
+        line that it comes to its place at its time.
+        """
+        if clock is None or not self.engine.coupled:
+            return clock
+        p, islands = self.system.particles, self.system.island_of_particle
+        early = (np.bincount(islands)[islands] > 1) & (clock > t0)
+        p.x[early] -= (p.v[early] * (clock[early] - t0)[:, None]).astype(p.dtype)
+        return np.where(early, t0, clock)
 
     def _age(self, span: Span, clock: Array | None) -> None:
         age = self.system.particles.age
@@ -273,18 +336,25 @@ class Simulation:
             t0, t1 = span.time(k), span.time(k + 1)
             age += np.asarray(t1 - (t0 if clock is None else np.clip(clock, t0, t1)), age.dtype)
 
-    def _bury(self, born: Sequence[tuple[int, Birth]], t1: float) -> None:
-        """Take away those whose time has come by t1."""
-        for k, birth in born:
+    def _bury(self, born: Born, t1: float) -> None:
+        """Take away those whose time has come by t1, who are in a zone, and who are too many."""
+        for k, birth in ((k, birth) for births in born for k, birth in enumerate(births)):
             mortal = np.isfinite(birth.lifetime)
             if mortal.any():
                 self._mortal = np.append(self._mortal, birth.ids(k)[mortal])
-                self._death = np.append(self._death, (birth.time + birth.lifetime)[mortal])
-        dead = self._death <= t1
-        if dead.any():
-            rows = self.system.particles.rows(self._mortal[dead])
-            self.system.remove(rows[rows >= 0])
-            self._mortal, self._death = self._mortal[~dead], self._death[~dead]
+                self._death = np.append(self._death, birth.death[mortal])
+        self._lineage.settle(born, t1)
+        p, dead = self.system.particles, self._death <= t1
+        rows = p.rows(self._mortal[dead])
+        gone = np.zeros(len(p), bool)
+        gone[rows[rows >= 0]] = True
+        self._mortal, self._death = self._mortal[~dead], self._death[~dead]
+        for zone in self.zones:
+            gone |= zone.kills(p.x, t1)
+        if gone.any():
+            self.system.remove(gone)
+        if self.max_particles is not None and len(p) > self.max_particles:
+            self.system.remove(oldest(p, len(p) - self.max_particles))
 
     def _frames(self, count: int, fps: float) -> Iterator[Frame]:
         for _ in range(count):

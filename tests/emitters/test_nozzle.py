@@ -27,7 +27,7 @@ def born(nozzle, cuts, seed=0, stream="s"):
     cuts=st.lists(st.floats(0, 1), max_size=12),
 )
 def test_births_are_the_same_however_time_is_cut(rate, start, length, cuts):
-    nozzle = pm.Nozzle(rate=rate, start=start, stop=start + length, lifetime=2, lifetime_range=1, radius=0.1)
+    nozzle = pm.Nozzle(rate=rate, start=start, stop=start + length, lifetime=pm.Spread(2, 1), radius=0.1)
     t0, t1 = start - 0.5, start + length + 0.5
     whole = born(nozzle, [t0, t1])
     several = born(pm.Nozzle(**nozzle.arguments), [t0, *(t0 + np.sort(cuts) * (t1 - t0)), t1])
@@ -42,7 +42,7 @@ def test_births_are_the_same_however_time_is_cut(rate, start, length, cuts):
 @pytest.mark.parametrize("name", ["euler", "leapfrog", "rk4", "dopri5", "implicit_midpoint"])
 def test_a_stream_is_evenly_spaced(name, dt):
     system = pm.ParticleSystem(pm.Particles(np.zeros((0, 3))))
-    nozzle = pm.Nozzle(direction=(1, 0, 0), rate=100, speed=3, speed_range=0, cone=0)
+    nozzle = pm.Nozzle(direction=(1, 0, 0), rate=100, speed=3, cone=0)
     sim = pm.Simulation(system, SOLVERS[name](), dt, emitters=[nozzle])
     sim.step(round(0.5 / dt))
     p = system.particles
@@ -62,7 +62,7 @@ def test_S02_steady_number():
 
 def test_deaths_are_on_time():
     system = pm.ParticleSystem(pm.Particles([[9, 9, 9]]))
-    sim = pm.Simulation(system, dt=1 / 60, emitters=[pm.Nozzle(rate=50, lifetime=0.5, lifetime_range=0.3)], seed=4)
+    sim = pm.Simulation(system, dt=1 / 60, emitters=[pm.Nozzle(rate=50, lifetime=pm.Spread(0.5, 0.3))], seed=4)
     lifetime = born(sim.emitters[0], [0, 4.0], 4, "Nozzle 0")["lifetime"]
     for _ in range(120):
         sim.step()
@@ -107,8 +107,8 @@ def test_every_solver_can_begin_without_particles(name):
 
 def test_streams_are_independent():
     n = 20_000
-    one, two = (born(pm.Nozzle(rate=1, speed_range=2), [0, n], 0, s)["v"] for s in ("a", "b"))
-    three = born(pm.Nozzle(rate=1, speed_range=2), [0, n], 1, "a")["v"]
+    one, two = (born(pm.Nozzle(rate=1, speed=pm.Spread(5, 2)), [0, n], 0, s)["v"] for s in ("a", "b"))
+    three = born(pm.Nozzle(rate=1, speed=pm.Spread(5, 2)), [0, n], 1, "a")["v"]
     for other in (two, three):
         speeds = [np.linalg.norm(v, axis=1) for v in (one, other)]
         assert abs(np.corrcoef(speeds)[0, 1]) < 4 / np.sqrt(n)
@@ -118,7 +118,7 @@ def test_streams_are_independent():
 def test_directions_are_even_over_the_cone(cone):
     n = 20_000
     axis = np.array([1, 2, -2]) / 3
-    v = born(pm.Nozzle(direction=axis, rate=1, speed=5, speed_range=0, cone=cone), [0, n])["v"] / 5
+    v = born(pm.Nozzle(direction=axis, rate=1, speed=5, cone=cone), [0, n])["v"] / 5
     np.testing.assert_allclose(np.linalg.norm(v, axis=1), 1, rtol=1e-12)
     height, edge = v @ axis, np.cos(np.radians(cone))
     assert height.min() >= edge - 1e-12
@@ -141,7 +141,7 @@ def test_places_are_even_over_the_disc():
 
 def test_speeds_and_lifetimes_have_their_half_range():
     n = 20_000
-    b = born(pm.Nozzle(rate=1, speed=4, speed_range=1, lifetime=3, lifetime_range=2), [0, n])
+    b = born(pm.Nozzle(rate=1, speed=pm.Spread(4, 1), lifetime=pm.Spread(3, 2)), [0, n])
     for values, mean, half in ((np.linalg.norm(b["v"], axis=1), 4, 1), (b["lifetime"], 3, 2)):
         assert np.abs(values - mean).max() <= half + 1e-12
         assert values.mean() == pytest.approx(mean, abs=4 * half / np.sqrt(3 * n))
@@ -154,11 +154,11 @@ def test_speeds_and_lifetimes_have_their_half_range():
         {"rate": 0},
         {"rate": math.inf},
         {"speed": -1},
-        {"speed": 1, "speed_range": 2},
+        {"speed": pm.Spread(1, 2)},
         {"cone": 181},
         {"radius": -1},
         {"lifetime": 0},
-        {"lifetime": 1, "lifetime_range": 1},
+        {"lifetime": pm.Spread(1, 1)},
         {"mass": 0},
         {"size": -1},
         {"start": 2, "stop": 2},

@@ -260,7 +260,7 @@ def test_a_force_is_switched_off_and_on() -> None:
 def test_births_and_deaths_and_frames_between_steps() -> None:
     def run(compiled: bool) -> list[pm.Frame]:
         start = pm.ParticleSystem(pm.Particles(np.zeros((0, 3))), [pm.Gravity(), pm.Drag(0.01)])
-        nozzle = pm.Nozzle(rate=300, speed=3, lifetime=0.3, lifetime_range=0.2)
+        nozzle = pm.Nozzle(rate=300, speed=3, lifetime=pm.Spread(0.3, 0.2))
         sim = pm.Simulation(start, pm.RK4(), 1 / 100, emitters=[nozzle], compiled=compiled)
         return list(sim.frames(12, fps=24))
 

@@ -63,7 +63,7 @@ def stability_report(scene: Scene) -> dict[str, Any]:
 
 def _add_first_births(simulation: Simulation, steps: int) -> None:
     """Add to the start the first particle that each emitter makes within so many steps."""
-    waiting = set(range(len(simulation.emitters)))
+    waiting = {k for k, emitter in enumerate(simulation.emitters) if not emitter.of}
     for step in range(steps):
         for k, birth in enumerate(simulation.births(step)):
             if k in waiting and len(birth.number):

@@ -11,7 +11,14 @@ import click
 
 from pointmass.errors import unknown
 
-KINDS = {"bodies": "body", "forces": "force", "colliders": "collider", "emitters": "emitter", "solver": "solver"}
+KINDS = {
+    "bodies": "body",
+    "forces": "force",
+    "colliders": "collider",
+    "emitters": "emitter",
+    "zones": "zone",
+    "solver": "solver",
+}
 COMMON = {  # parameters that most types have and few explain
     "on": "the group that it acts on; all particles by default",
     "enabled": "false switches it off",

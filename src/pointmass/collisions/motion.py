@@ -1,4 +1,4 @@
-"""Where a collider is at which time."""
+"""Where a collider or an emitter is at which time."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Motion:
     def __init__(self, place: Vector, name: str = "center") -> None:
         self._place = Parameter(name, place, vector=True, unit="m")
         if not self._place.common:
-            raise InvalidInput(f"{name} of a collider may depend on t and nothing else")
+            raise InvalidInput(f"{name} may depend on t and nothing else")
         self._velocity = self._place.rate()
         self._acceleration = self._velocity.rate()
         self.parameters = self._place, self._velocity, self._acceleration

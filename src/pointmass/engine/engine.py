@@ -8,7 +8,8 @@ it again on the reference path, which names what it was.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -24,7 +25,7 @@ from pointmass.engine.phases import simple
 from pointmass.engine.reference import ReferenceEngine
 from pointmass.engine.singles import SingleMembers, SinglesKernel
 from pointmass.engine.threads import spread
-from pointmass.errors import InvalidInput
+from pointmass.errors import Diverged, InvalidInput
 from pointmass.laws.elements import ElementForce
 from pointmass.laws.force import Force
 from pointmass.laws.pairs import PairForce
@@ -193,14 +194,12 @@ class Engine:
         """
         p = self.system.particles
         self._last = span, births, p.id, self.reference.left()
-        if self._before is None or self._before[0].shape != p.x.shape:
-            self._before = np.empty_like(p.x), np.empty_like(p.v)
+        before = self._room()
         kernels = [g.members for g in self._grouped(births, span.start) if g.rows is None]
         if births is None and not look_inside and len(kernels) == 1 and isinstance(kernels[0], SingleMembers):
-            kernels[0].before = self._before  # in one go with the steps
+            kernels[0].before = before  # in one go with the steps
         else:
-            for kept, array in zip(self._before, (p.x, p.v), strict=True):
-                _copied(kept, array)
+            self._keep()
         self._looked = not look_inside
         if look_inside and span.count > 1:
             whole = self._launch(replace(span, count=span.count - 1), births)
@@ -222,11 +221,11 @@ class Engine:
         self.reference.remember(memory, Stats())  # also that nobody has moved anything by hand
         return True
 
-    def _launch(self, span: Span, births: Array | None) -> bool:
+    def _launch(self, span: Span, births: Array | None, groups: Sequence[Group] | None = None) -> bool:
         p = self.system.particles
         memory = self.reference.recall()
         outcomes = []
-        for group in self._grouped(births, span.start):
+        for group in self._grouped(births, span.start) if groups is None else groups:
             x, v = _taken(p.x, group.rows), _taken(p.v, group.rows)
             clock = births if births is None or group.rows is None else births[group.rows]
             outcome = group.members.run(x, v, clock, span, memory)
@@ -246,6 +245,19 @@ class Engine:
         self.reference.remember(memory, work)
         return True
 
+    def _room(self) -> tuple[Array, Array]:
+        """Room for the positions and velocities before a span."""
+        p = self.system.particles
+        if self._before is None or self._before[0].shape != p.x.shape:
+            self._before = np.empty_like(p.x), np.empty_like(p.v)
+        return self._before
+
+    def _keep(self) -> None:
+        """Keep positions and velocities as they are before a span."""
+        p = self.system.particles
+        for kept, array in zip(self._room(), (p.x, p.v), strict=True):
+            _copied(kept, array)
+
     def _again(self, group: Group) -> tuple[Array, Array]:
         """Positions and velocities of a group as they were before the span."""
         assert self._before is not None
@@ -253,6 +265,48 @@ class Engine:
         rows = slice(None) if group.rows is None else group.rows
         p.x[rows], p.v[rows] = self._before[0][rows], self._before[1][rows]
         return _taken(p.x, group.rows), _taken(p.v, group.rows)
+
+    @contextmanager
+    def rehearsal(self) -> Iterator[None]:
+        """What happens inside leaves no trace: who is there, state, clock and the solver's memory are put back."""
+        system, p, left = self.system, self.system.particles, self.reference.left()
+        x, v, t = p.x.copy(), p.v.copy(), system.t
+        try:
+            yield
+        finally:
+            if len(p) > len(x):
+                system.remove(np.arange(len(x), len(p)))
+            p.x[:], p.v[:], system.t = x, v, t
+            self.reference.leave(left)
+
+    def ahead(self, rows: Rows, span: Span, births: Array, compiled: bool) -> None:
+        """Take some particles over a span, and those that they are joined to; for a `rehearsal`.
+
+        Parameters
+        ----------
+        births : clock at which each particle begins [s], shape (n,).
+        compiled : whether by kernels.
+
+        Raises
+        ------
+        Diverged
+            Something goes wrong on the way.
+        """
+        if not compiled:
+            waits = np.full(len(births), not self.coupled)
+            waits[rows] = False
+            for k in range(span.count):
+                end = span.time(k + 1)
+                self.reference.step(span.time(k), end, np.where(waits, end, np.clip(births, span.time(k), end)))
+            return
+        if self.coupled:
+            groups = self._grouped(births, span.start)
+        else:
+            kind, how = (SinglesKernel, True) if _by_lanes(self.solver) else (IslandKernel, False)
+            groups = [self._made(kind, rows, self.system.island_of_particle, how)]
+        self._keep()
+        if not self._launch(span, births, groups):
+            raise Diverged("a particle that others follow goes astray")
 
     def state_at(self, t: float) -> Array:
         """State of the present particles at a time within the last step, shape (dim,); nothing is changed.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from pointmass.collisions import Plane
-from pointmass.emitters import Nozzle
+from pointmass.emitters import Nozzle, Spread
 from pointmass.forces import Gravity, Wind
 from pointmass.frame import Camera, Frame
 from pointmass.look import Look
@@ -53,12 +53,10 @@ class Fountain(ShippedScene):
                 Nozzle(
                     (0.0, 0.02, 0.0),
                     rate=self.rate,
-                    speed=self.speed,
-                    speed_range=min(self.speed_range, self.speed),
+                    speed=Spread(self.speed, min(self.speed_range, self.speed)),
                     cone=self.cone,
                     radius=0.02,
-                    lifetime=self.lifetime,
-                    lifetime_range=0.2 * self.lifetime,
+                    lifetime=Spread(self.lifetime, 0.2 * self.lifetime),
                     mass=DROP,
                 )
             ],

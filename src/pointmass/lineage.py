@@ -1,0 +1,189 @@
+"""Particles that come from particles: who follows whom, and which children there will be.
+
+The paths of parents are found first, in a rehearsal that leaves no trace, step by step and generation by generation.
+Then all who are born in a span are known before it is run, each with its own time and place, as if an emitter had
+made them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.collisions.swept import Paths
+from pointmass.emitters.emitter import Array, Birth, Emitter, Parents
+from pointmass.engine.engine import Engine
+from pointmass.engine.island import Span
+from pointmass.errors import InvalidInput, unknown
+
+Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Kin:
+    """Living particles of an emitter that others follow.
+
+    Attributes
+    ----------
+    ids, birth, death : of each, shape (k,).
+    """
+
+    ids: NDArray[np.int64]
+    birth: Array
+    death: Array
+
+    def joined(self, other: Kin) -> Kin:
+        """These and others."""
+        return Kin(
+            np.concatenate([self.ids, other.ids]),
+            np.concatenate([self.birth, other.birth]),
+            np.concatenate([self.death, other.death]),
+        )
+
+    def take(self, rows: NDArray[np.bool_]) -> Kin:
+        """Some of them."""
+        return Kin(self.ids[rows], self.birth[rows], self.death[rows])
+
+
+class Lineage:
+    """Which emitters follow which, and the living particles that may have children.
+
+    Attributes
+    ----------
+    order : numbers of the emitters, those that are followed before those that follow them.
+
+    Raises
+    ------
+    InvalidInput
+        An emitter follows one that does not exist, or itself by whatever detours; two have one name.
+    """
+
+    def __init__(self, emitters: Sequence[Emitter]) -> None:
+        self.emitters = emitters
+        named = [e.name for e in emitters if e.name]
+        for name in named:
+            if named.count(name) > 1:
+                raise InvalidInput(f"name = {name!r} is that of {named.count(name)} emitters: give each its own")
+        for e in emitters:
+            if e.of and e.of not in named:
+                raise unknown("name of an emitter in of:", e.of, named)
+        self.parent = {k: [f.name for f in emitters].index(e.of) for k, e in enumerate(emitters) if e.of}
+        self.order: list[int] = []
+        while len(self.order) < len(emitters):
+            known = [-1, *self.order]
+            ready = [k for k in range(len(emitters)) if k not in known and self.parent.get(k, -1) in known]
+            if not ready:
+                left = next(e.of for k, e in enumerate(emitters) if k not in known)
+                raise InvalidInput(f"of = {left!r} goes round in a circle: an emitter cannot follow its own children")
+            self.order += ready
+        self.followed = {p: [k for k in self.parent if self.parent[k] == p] for p in set(self.parent.values())}
+        nobody = Kin(np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
+        self.kin = dict.fromkeys(self.followed, nobody)
+
+    def settle(self, born: Sequence[Sequence[Birth]], t: float) -> None:
+        """Know who was born, and forget who is dead by a time."""
+        for k in self.kin:
+            for births in born:
+                self.kin[k] = self.kin[k].joined(_kin(k, births[k]))
+            self.kin[k] = self.kin[k].take(self.kin[k].death > t)
+
+    def foresee(
+        self, engine: Engine, span: Span, born: list[list[Birth]], compiled: bool, seed: int, streams: Sequence[str]
+    ) -> list[list[Birth]]:
+        """Who will be born in each step of a span, of each emitter.
+
+        Parameters
+        ----------
+        born : the births that have no parents.
+        compiled : whether parents are taken ahead by kernels.
+        streams : names of the emitters, for chance.
+
+        Raises
+        ------
+        Diverged
+            A parent goes astray.
+        """
+        if not any(len(self.kin[k].ids) or any(len(step[k].number) for step in born) for k in self.kin):
+            return born
+        with engine.rehearsal():
+            rehearsal = _Rehearsal(self, engine, span, compiled)
+            for number, known in enumerate(born):
+                step = replace(span, first=span.first + number, count=1)
+                rehearsal.begin(step)
+                stretch: dict[int, Parents] = {}
+                for k in self.order:
+                    if k in self.parent:
+                        parents = stretch[self.parent[k]]
+                        known[k] = self.emitters[k].offspring(parents, step.start, step.end, seed, streams[k])
+                    if k in self.followed:
+                        stretch[k] = rehearsal.stretch(k, known[k], step)
+        return born
+
+
+class _Rehearsal:
+    """Parents on their way through a span."""
+
+    def __init__(self, lineage: Lineage, engine: Engine, span: Span, compiled: bool) -> None:
+        self.lineage, self.engine, self.span, self.compiled = lineage, engine, span, compiled
+        self.system = engine.system
+        self.rows = {k: self.system.particles.rows(kin.ids) for k, kin in lineage.kin.items()}
+        self.kin = {k: kin.take(self.rows[k] >= 0) for k, kin in lineage.kin.items()}  # nobody whom a hand took away
+        self.rows = {k: rows[rows >= 0] for k, rows in self.rows.items()}
+        self.ends: tuple[Array, Array] | None = None  # of everybody, where particles act on each other
+
+    def begin(self, step: Span) -> None:
+        """Find where those who are joined to others will be at the end of a step."""
+        if self.engine.coupled:
+            p = self.system.particles
+            with self.engine.rehearsal():
+                self.engine.ahead(np.arange(len(p)), step, np.full(len(p), step.start), self.compiled)
+                self.ends = p.x.copy(), p.v.copy()
+
+    def stretch(self, k: int, newborn: Birth, step: Span) -> Parents:
+        """The particles of an emitter in a step, which is the next one for them."""
+        p, count = self.system.particles, len(self.rows[k])
+        kin = self.kin[k].joined(_kin(k, newborn))
+        clock = np.maximum(kin.birth, step.start)
+        x0 = np.concatenate([p.x[self.rows[k]], newborn.x]).astype(np.float64)
+        v0 = np.concatenate([p.v[self.rows[k]], newborn.v]).astype(np.float64)
+        still = Paths(x0, v0, x0, v0, clock, step.end - clock, np.zeros(len(clock)))
+        parents = Parents(kin.ids, kin.birth, kin.death, np.arange(len(clock)) >= count, still)
+        awaited = np.zeros(len(clock), bool)
+        for follower in self.lineage.followed[k]:
+            awaited |= self.lineage.emitters[follower].awaits(parents, self.span.end)
+        rows = np.append(self.rows[k], self._added(newborn, kin.ids[count:], awaited[count:]))
+        paths = self._paths(rows, awaited, still, step)
+        self.kin[k], self.rows[k] = kin.take(rows >= 0), rows[rows >= 0]
+        return replace(parents, paths=paths).take(kin.death > step.start)
+
+    def _added(self, newborn: Birth, ids: NDArray[np.int64], awaited: NDArray[np.bool_]) -> Rows:
+        """Rows of the newborn, -1 for those who need not go along."""
+        rows = np.full(len(awaited), -1)
+        if self.ends is None and awaited.any():
+            rows[awaited] = len(self.system.particles) + np.arange(int(awaited.sum()))
+            columns = {name: np.broadcast_to(c, len(awaited))[awaited] for name, c in newborn.columns.items()}
+            self.system.add(newborn.x[awaited], newborn.v[awaited], id=ids[awaited], **columns)
+        return rows
+
+    def _paths(self, rows: Rows, awaited: NDArray[np.bool_], still: Paths, step: Span) -> Paths:
+        """The ways of those who are awaited. Where particles act on each other, the newborn go straight."""
+        p, goes = self.system.particles, awaited & (rows >= 0)
+        x0, v0 = still.x0, still.v0
+        x1, v1 = x0 + still.h[:, None] * v0, v0.copy()
+        if self.ends is not None:
+            x1[goes], v1[goes] = self.ends[0][rows[goes]], self.ends[1][rows[goes]]
+        elif goes.any():
+            births = np.full(len(p), step.start)
+            births[rows[goes]] = still.t0[goes]
+            self.engine.ahead(np.sort(rows[goes]), step, births, self.compiled)
+            x1[goes], v1[goes] = p.x[rows[goes]], p.v[rows[goes]]
+        if self.system.order == 1:
+            v0 = v1 = (x1 - x0) / np.where(still.h > 0, still.h, 1)[:, None]
+        return replace(still, v0=v0, x1=x1, v1=v1)
+
+
+def _kin(emitter: int, births: Birth) -> Kin:
+    return Kin(births.ids(emitter), births.time, births.death)
