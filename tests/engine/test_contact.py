@@ -29,6 +29,14 @@ WORLDS = {
     "paddle": lambda **k: [pm.Sphere(center=("sin(9*t)", 0, "0.2*t"), radius=0.5, **k), pm.Plane((0, -1, 0), **k)],
     "lift": lambda **k: [pm.Box(center=(0, "-1+0.3*sin(8*t)", 0), size=(1, 1.8, 1), **k)],
 }
+ROD = {"a": (-0.7, -0.4, 0.3), "b": (0.8, -0.1, -0.2)}
+WORLDS["round"] = lambda **k: [
+    pm.Capsule(**ROD, radius=0.4, **k),
+    pm.Cylinder(**ROD, radius=0.5, shift=(0, "-0.6+0.2*sin(8*t)", 0), **k),
+    pm.Capsule((0, -0.5, 0), (0, 0.5, 0.1), radius=1.5, inside=True, **k),
+    pm.Cylinder((0, -1.2, 0), (0.1, 1.4, 0), radius=1.3, inside=True, **k),
+    pm.Cylinder((0.8, 0.8, 0), (1, 1, 0.3), radius=0.2, **k),
+]
 WORLDS["everything"] = lambda **k: [c for name in ("room", "ball", "paddle", "plates") for c in WORLDS[name](**k)]
 FLOATS = st.floats(-1.4, 1.4)
 POINTS = st.tuples(FLOATS, FLOATS, FLOATS)

@@ -87,13 +87,7 @@ class Box(Collider):
         return corners, np.array(FACES, np.int32)
 
     def _wall(self, axis: int, side: float) -> Plane:
-        wall = Plane(
-            normal=-side * np.eye(3)[axis],
-            restitution=self.restitution,
-            friction=self.friction,
-            eps=self.eps,
-            contact=self.contact,
-        )
+        wall = Plane(normal=-side * np.eye(3)[axis], **self.material)
         wall.motion, wall.offset = self.motion, -float(self.half[axis])
         return wall
 

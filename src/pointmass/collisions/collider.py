@@ -40,10 +40,13 @@ class Collider(Described, ABC):
     bulges : True where the solid is convex (ball, block): a line between two free points may pass through it. False
         where the free space is convex (plane, inside of a sphere).
     curved : False where the surface is flat everywhere, and only there.
+    smooth : True where pictures shade its mesh round.
+    material : restitution, friction, eps and contact, by name.
     """
 
     bulges: ClassVar[bool] = True
     curved: ClassVar[bool] = True
+    smooth: ClassVar[bool] = False
     place: ClassVar[str] = "center"
 
     def __init__(self, place: Vector, restitution: float, friction: float, eps: float, contact: Contact) -> None:
@@ -54,6 +57,10 @@ class Collider(Described, ABC):
         if contact not in ("swept", "discrete"):
             raise InvalidInput(f"contact = {contact!r} is not allowed: it must be 'swept' or 'discrete'")
         self.contact = contact
+
+    @property
+    def material(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in ("restitution", "friction", "eps", "contact")}
 
     @property
     def name(self) -> str:
