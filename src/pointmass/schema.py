@@ -82,7 +82,10 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
 }
 UNKNOWN = (Any, "another value")
 FLOW_OR_VECTOR = "Vector | VelocityField"
-SHORT = {"Contact": "Literal['swept', 'discrete']"}
+SHORT = {
+    "Contact": "Literal['swept', 'discrete']",
+    "Response": "Literal['bounce', 'stick', 'slide', 'kill']",
+}
 
 
 @cache

@@ -212,7 +212,7 @@ class Simulation:
         if not self.engine.compiled:
             self._step()
             return
-        single = (self.emitters or len(self._mortal)) and self.engine.coupled
+        single = (self.emitters or len(self._mortal) or self.engine.deadly) and self.engine.coupled
         span = Span(self.t0, self.dt, self.steps, 1 if single else min(most, self.engine.longest()))
         born = [birth for k in range(span.count) for birth in enumerate(self.births(span.first + k))]
         old = len(self.system.particles)
@@ -272,17 +272,20 @@ class Simulation:
             age += np.asarray(t1 - (t0 if clock is None else np.clip(clock, t0, t1)), age.dtype)
 
     def _bury(self, born: Sequence[tuple[int, Birth]], t1: float) -> None:
-        """Take away those whose time has come by t1."""
+        """Take away those whose time has come by t1, and those whom surfaces killed."""
         for k, birth in born:
             mortal = np.isfinite(birth.lifetime)
             if mortal.any():
                 self._mortal = np.append(self._mortal, birth.ids(k)[mortal])
                 self._death = np.append(self._death, (birth.time + birth.lifetime)[mortal])
+        gone = [self.engine.died]
         dead = self._death <= t1
         if dead.any():
             rows = self.system.particles.rows(self._mortal[dead])
-            self.system.remove(rows[rows >= 0])
+            gone.append(rows[rows >= 0])
             self._mortal, self._death = self._mortal[~dead], self._death[~dead]
+        if any(len(rows) for rows in gone):
+            self.system.remove(np.unique(np.concatenate(gone)))
 
     def _frames(self, count: int, fps: float) -> Iterator[Frame]:
         for _ in range(count):

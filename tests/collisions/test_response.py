@@ -60,6 +60,7 @@ def test_discrete_tunnels_and_swept_does_not():
         (lambda: pm.Plane(friction=-1), "friction"),
         (lambda: pm.Plane(eps=0), "eps"),
         (lambda: pm.Plane(contact="soft"), "contact"),
+        (lambda: pm.Plane(response="melt"), "response = 'melt' is not allowed: it must be 'bounce', 'stick'"),
         (lambda: pm.Plane(normal=(0, 0, 0)), "normal"),
         (lambda: pm.Plane(normal=(0, np.nan, 1)), "normal"),
         (lambda: pm.Plane(point=("charge", 0, 0)), "point of a collider may depend on t"),

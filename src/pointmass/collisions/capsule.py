@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, Contact
+from pointmass.collisions.collider import Array, Collider, Contact, Response
 from pointmass.collisions.laws import all_of, along
 from pointmass.collisions.revolution import AROUND, axis_between, on_axis, revolved, turned
 from pointmass.errors import number
@@ -26,7 +26,7 @@ class Capsule(Collider):
     radius : [m], greater than 0.
     inside : whether the free space is inside.
     shift : moves the whole capsule [m]; a function of t.
-    restitution, friction, eps, contact : as for every collider.
+    restitution, friction, eps, contact, response : as for every collider.
     """
 
     bulges: ClassVar[bool]
@@ -45,8 +45,9 @@ class Capsule(Collider):
         friction: float = 0.3,
         eps: float = 1e-4,
         contact: Contact = "swept",
+        response: Response = "bounce",
     ) -> None:
-        super().__init__(shift, restitution, friction, eps, contact)
+        super().__init__(shift, restitution, friction, eps, contact, response)
         self.middle, self.direction, self.half = axis_between(a, b)
         self.radius = number("radius", radius, above=0, unit="m")
         self.bulges = not inside  # type: ignore[misc]  # a property of this capsule

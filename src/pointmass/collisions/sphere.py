@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, Contact
+from pointmass.collisions.collider import Array, Collider, Contact, Response
 from pointmass.collisions.laws import all_of, along
 from pointmass.collisions.revolution import AROUND, revolved
 from pointmass.errors import number
@@ -24,7 +24,7 @@ class Sphere(Collider):
     center : [m]; a function of t moves it.
     radius : [m], greater than 0.
     inside : whether the free space is inside.
-    restitution, friction, eps, contact : as for every collider.
+    restitution, friction, eps, contact, response : as for every collider.
     """
 
     bulges: ClassVar[bool]
@@ -40,8 +40,9 @@ class Sphere(Collider):
         friction: float = 0.3,
         eps: float = 1e-4,
         contact: Contact = "swept",
+        response: Response = "bounce",
     ) -> None:
-        super().__init__(center, restitution, friction, eps, contact)
+        super().__init__(center, restitution, friction, eps, contact, response)
         self.radius = number("radius", radius, above=0, unit="m")
         self.bulges = not inside  # type: ignore[misc]  # a property of this sphere
         self.sign = -1.0 if inside else 1.0
