@@ -173,24 +173,31 @@ def cloth():
 # ---------------------------------------------------------------------------------------------------- extending, scenes
 
 
-def capsule():
+def coin():
     """Sparks on the collider of docs/extending.md."""
     page = (FOLDER.parent / "extending.md").read_text(encoding="utf-8")
-    source = page.split("<!-- capsule -->\n```python\n")[1].split("```")[0]
+    source = page.split("<!-- coin -->\n```python\n")[1].split("```")[0]
     names: dict = {"pm": pm, "np": np}
     exec(source, names)  # the page's own class
-    rail = names["Capsule"](a=(-0.7, 0.5, 0), b=(0.7, 0.9, 0), radius=0.15, restitution=0.6)
+    coin = names["Coin"]((0, 0.7, 0), (-0.35, 1, 0.1), radius=0.6, thickness=0.16, restitution=0.6)
+    rain(
+        "coin",
+        [coin, pm.Plane(restitution=0.3)],
+        pm.Nozzle((0.35, 2.0, 0), direction=(0, -1, 0), rate=500.0, speed=2.0, cone=6.0, radius=0.1, lifetime=1.6),
+    )
+
+
+def rain(name, colliders, nozzle):
+    """Sparks of a nozzle that rain on colliders."""
     scene = pm.Scene(
         dt=1 / 120,
         solver=pm.Leapfrog(),
-        emitters=[
-            pm.Nozzle((0.35, 2.0, 0), direction=(0, -1, 0), rate=500.0, speed=2.0, cone=6.0, radius=0.1, lifetime=1.6)
-        ],
+        emitters=[nozzle],
         forces=[pm.Gravity()],
-        colliders=[rail, pm.Plane(restitution=0.3)],
+        colliders=colliders,
         look=pm.Look(particles="glow", size=0.018, color_by="speed", trails=0.06, floor_size=40.0),
     )
-    save("capsule", last(scene.simulation().frames(120, 60)), pm.Camera(azimuth=12, elevation=10))
+    save(name, last(scene.simulation().frames(120, 60)), pm.Camera(azimuth=12, elevation=10))
 
 
 def sparks():
@@ -246,7 +253,7 @@ PICTURES = (
     drag,
     bounces,
     cloth,
-    capsule,
+    coin,
     sparks,
     smoke,
     snow,

@@ -40,6 +40,7 @@ NEEDED: dict[str, dict[str, Any]] = {  # what cannot be left out, by kind
 }
 OTHER: dict[str, Any] = {  # another value than the default, by annotation
     "Contact": "discrete",
+    "Response": "slide",
     "bool": False,
     "float | None": 0.3,
     "Scalar": "0.5 + 0.1*sin(t)",

@@ -31,7 +31,13 @@ from .collisions import (
     Box as Box,
 )
 from .collisions import (
+    Capsule as Capsule,
+)
+from .collisions import (
     Collider as Collider,
+)
+from .collisions import (
+    Cylinder as Cylinder,
 )
 from .collisions import (
     Plane as Plane,

@@ -165,7 +165,8 @@ class _Rehearsal:
         if self.ends is None and awaited.any():
             rows[awaited] = len(self.system.particles) + np.arange(int(awaited.sum()))
             columns = {name: np.broadcast_to(c, len(awaited))[awaited] for name, c in newborn.columns.items()}
-            self.system.add(newborn.x[awaited], newborn.v[awaited], id=ids[awaited], **columns)
+            lifetime = newborn.lifetime[awaited]
+            self.system.add(newborn.x[awaited], newborn.v[awaited], lifetime=lifetime, id=ids[awaited], **columns)
         return rows
 
     def _paths(self, rows: Rows, awaited: NDArray[np.bool_], still: Paths, step: Span) -> Paths:

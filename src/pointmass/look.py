@@ -257,7 +257,7 @@ class Look:
             vertices=(corners + collider.at(t)).astype(np.float32),
             faces=faces,
             color=color,
-            smooth=type(collider).__name__ == "Sphere",
+            smooth=collider.smooth,
         )
 
     def _springs(self, system: ParticleSystem, extent: float) -> list[Drawable]:

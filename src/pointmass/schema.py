@@ -127,6 +127,7 @@ SHORT = {
     "Contact": "Literal['swept', 'discrete']",
     "Event": "Literal['death', 'birth', 'trail']",
     "Where": "Literal['surface', 'volume']",
+    "Response": "Literal['bounce', 'stick', 'slide', 'kill']",
 }
 
 

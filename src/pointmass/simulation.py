@@ -237,8 +237,9 @@ class Simulation:
         if not self.engine.compiled:
             self._step()
             return
-        changes = self.emitters or len(self._mortal)
-        single = (changes and self.engine.coupled) or self.zones or self.max_particles is not None
+        changes = self.emitters or len(self._mortal) or self.engine.deadly
+        parents_killed = self.engine.deadly and self._lineage.followed
+        single = (changes and self.engine.coupled) or parents_killed or self.zones or self.max_particles is not None
         span = Span(self.t0, self.dt, self.steps, 1 if single else min(most, self.engine.longest()))
         try:
             born = self._born(span, compiled=True)
@@ -337,7 +338,7 @@ class Simulation:
             age += np.asarray(t1 - (t0 if clock is None else np.clip(clock, t0, t1)), age.dtype)
 
     def _bury(self, born: Born, t1: float) -> None:
-        """Take away those whose time has come by t1, who are in a zone, and who are too many."""
+        """Take away those whose time has come by t1, whom a surface killed, who are in a zone, and who are too many."""
         for k, birth in ((k, birth) for births in born for k, birth in enumerate(births)):
             mortal = np.isfinite(birth.lifetime)
             if mortal.any():
@@ -348,6 +349,7 @@ class Simulation:
         rows = p.rows(self._mortal[dead])
         gone = np.zeros(len(p), bool)
         gone[rows[rows >= 0]] = True
+        gone[self.engine.died] = True
         self._mortal, self._death = self._mortal[~dead], self._death[~dead]
         for zone in self.zones:
             gone |= zone.kills(p.x, t1)

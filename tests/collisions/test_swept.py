@@ -17,6 +17,10 @@ SURFACES = [
     pm.Box(size=(1, 2, 0.5)),
     pm.Polygon([[-1, 0, -1], [-1, 0, 1], [1, 0, 1], [1, 0, -1]]),
     pm.Sphere(center=("sin(3*t)", 0, 0), radius=0.8),
+    pm.Capsule((-0.5, -0.5, 0), (0.5, 0.3, 0.2), radius=0.3),
+    pm.Capsule((-1, 0, 0), (1, 1, 0), radius=3, inside=True),
+    pm.Cylinder((-0.5, -0.5, 0), (0.5, 0.3, 0.2), radius=0.6),
+    *pm.Cylinder((0, -3, 0), (1, 3, 0), radius=3, inside=True).surfaces,
 ]
 
 

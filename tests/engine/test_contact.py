@@ -13,7 +13,7 @@ import pointmass as pm
 from pointmass.collisions.swept import Paths, first_hit
 from pointmass.engine import store
 from pointmass.engine.contact import ContactText
-from pointmass.engine.reference import ReferenceEngine, surfaces_of
+from pointmass.engine.reference import KILLED, ReferenceEngine, surfaces_of
 from pointmass.solvers import SOLVERS
 
 PLATE = [[-1, 0.3, -1], [-1, 0.3, 1], [0.4, 0, 1], [0.4, 0, -1]]
@@ -29,6 +29,14 @@ WORLDS = {
     "paddle": lambda **k: [pm.Sphere(center=("sin(9*t)", 0, "0.2*t"), radius=0.5, **k), pm.Plane((0, -1, 0), **k)],
     "lift": lambda **k: [pm.Box(center=(0, "-1+0.3*sin(8*t)", 0), size=(1, 1.8, 1), **k)],
 }
+ROD = {"a": (-0.7, -0.4, 0.3), "b": (0.8, -0.1, -0.2)}
+WORLDS["round"] = lambda **k: [
+    pm.Capsule(**ROD, radius=0.4, **k),
+    pm.Cylinder(**ROD, radius=0.5, shift=(0, "-0.6+0.2*sin(8*t)", 0), **k),
+    pm.Capsule((0, -0.5, 0), (0, 0.5, 0.1), radius=1.5, inside=True, **k),
+    pm.Cylinder((0, -1.2, 0), (0.1, 1.4, 0), radius=1.3, inside=True, **k),
+    pm.Cylinder((0.8, 0.8, 0), (1, 1, 0.3), radius=0.2, **k),
+]
 WORLDS["everything"] = lambda **k: [c for name in ("room", "ball", "paddle", "plates") for c in WORLDS[name](**k)]
 FLOATS = st.floats(-1.4, 1.4)
 POINTS = st.tuples(FLOATS, FLOATS, FLOATS)
@@ -97,13 +105,15 @@ class ScalarEngine(ReferenceEngine):
         x0, v0 = system.split(step.y0)
         moved = np.flatnonzero((length > 0) & ~p.pinned)
         now, linked = end.copy(), []
+        doomed = np.zeros(len(p), bool)
         for i in moved:
             o, radius = i * self.text.record, p.radius[i]
             x[i], v[i] = np.reshape(
                 do["settle"](self.table, self.scratch, o, end[i], length[i], *x[i], *v[i], radius), (2, 3)
             )
             *state, hit = do["bounce"](self.table, end[i], *x[i], *v[i], radius)
-            reset[islands[i]] |= hit
+            reset[islands[i]] |= hit > 0
+            doomed[i] = hit >= KILLED
             x[i], v[i] = np.reshape(state, (2, 3))
         planned = x.copy(), v.copy()
         for i in moved:
@@ -120,6 +130,7 @@ class ScalarEngine(ReferenceEngine):
             x[i], v[i] = np.reshape(state, (2, 3))
             if now[i] < end[i]:
                 clock[islands[i]] = now[i]
+        self._events[doomed & ~(now < end)] += KILLED
         if linked:
             rows = np.array(linked)
             chord = (planned[0] - x0)[rows] / length[rows][:, None]
@@ -155,6 +166,7 @@ def same_steps(engines, dt, steps):
             else:
                 ends.append(e.system.get_state())
         np.testing.assert_array_equal(ends[0], ends[1])
+        np.testing.assert_array_equal(engines[0].died, engines[1].died)
         if isinstance(ends[0], str):
             return
 
@@ -171,15 +183,16 @@ def same_steps(engines, dt, steps):
     tilt=st.sampled_from([0.0, 3.0]),
     friction=st.sampled_from([0.0, 0.3, 2.0]),
     restitution=st.sampled_from([0.0, 0.4, 1.0]),
+    response=st.sampled_from(["bounce", "bounce", "bounce", "stick", "slide", "kill"]),
     dt=st.sampled_from([1 / 20, 1 / 100, 1 / 240]),
 )
-def test_the_same_bits(world, contact, name, x, v, speed, radius, tilt, friction, restitution, dt):
+def test_the_same_bits(world, contact, name, x, v, speed, radius, tilt, friction, restitution, response, dt):
     def forces():
         return [pm.Gravity((tilt, -9.81, 0.3 * tilt)), pm.Drag(0.1)]
 
     engines = pair_of_engines(
         world, contact, SOLVERS[name](), x, speed * np.array(v), radius, 0.7, forces,
-        friction=friction, restitution=restitution,
+        friction=friction, restitution=restitution, response=response,
     )  # fmt: skip
     same_steps(engines, dt, 12)
 
@@ -197,11 +210,13 @@ def test_linked_particles_finish_their_step(world, seed, speed):
 @given(
     world=st.sampled_from(sorted(WORLDS)), contact=st.sampled_from(["swept", "discrete"]),
     name=st.sampled_from(["euler", "rk4", "implicit_euler"]), x=POINTS, radius=st.sampled_from([0.0, 0.05]),
+    response=st.sampled_from(["bounce", "stick", "kill"]),
 )  # fmt: skip
-def test_a_flow(world, contact, name, x, radius):
+def test_a_flow(world, contact, name, x, radius, response):
     engines = pair_of_engines(
-        world, contact, SOLVERS[name](), x, (0, 0, 0), radius, 1.0, lambda: [pm.Flow(velocity=("sin(3*y)", -1.0, 0.5))]
-    )
+        world, contact, SOLVERS[name](), x, (0, 0, 0), radius, 1.0,
+        lambda: [pm.Flow(velocity=("sin(3*y)", -1.0, 0.5))], response=response,
+    )  # fmt: skip
     same_steps(engines, 1 / 30, 8)
 
 

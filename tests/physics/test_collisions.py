@@ -145,11 +145,17 @@ def test_C10_coulomb_impact(mu, tangential):
     np.testing.assert_allclose(after, [[tangential, 2.0, 0.0]], rtol=1e-12, atol=1e-15)
 
 
-@pytest.mark.parametrize("solver", [pm.Leapfrog(), pm.RK4(), pm.DormandPrince(rtol=1e-8)])
-def test_leaves_a_sphere_at_two_thirds(solver):
+BALL, ROD = pm.Sphere, lambda **k: pm.Capsule((0, 0, -1), (0, 0, 1), radius=1.0, **k)
+
+
+@pytest.mark.parametrize(
+    ("solver", "body"),
+    [(pm.Leapfrog(), BALL), (pm.RK4(), BALL), (pm.DormandPrince(rtol=1e-8), BALL), (pm.Leapfrog(), ROD)],
+)
+def test_leaves_a_sphere_at_two_thirds(solver, body):
     # From rest at the top of a smooth sphere: m v^2 / R = m g cos, v^2 = 2 g R (1 - cos), so cos = 2/3.
     angle, eps = 0.02, 1e-10  # once off, the gap grows as t^3 at first: 10 eps^(1/3) late
-    sim = drop(solver, 1 / 500, pm.Sphere(friction=0, eps=eps), x=(np.sin(angle), np.cos(angle), 0), v=(0, 0, 0))
+    sim = drop(solver, 1 / 500, body(friction=0, eps=eps), x=(np.sin(angle), np.cos(angle), 0), v=(0, 0, 0))
     surface = sim.system.colliders[0]
     last = None
     while sim.t < 3 and surface.distance(sim.system.particles.x, sim.t)[0] <= eps:
@@ -159,10 +165,18 @@ def test_leaves_a_sphere_at_two_thirds(solver):
     assert last == pytest.approx(2 / 3 * np.cos(angle), abs=4e-3)
 
 
-@pytest.mark.parametrize(("name", "tolerance"), [("leapfrog", 1e-3), ("rk4", 1e-7), ("implicit_midpoint", 1e-3)])
-def test_bowl_conserves_energy(name, tolerance):
+@pytest.mark.parametrize(
+    ("name", "tolerance", "bowl"),
+    [
+        ("leapfrog", 1e-3, BALL),
+        ("rk4", 1e-7, BALL),
+        ("implicit_midpoint", 1e-3, BALL),
+        ("leapfrog", 1e-3, lambda **k: pm.Cylinder((0, 0, -1), (0, 0, 1), radius=1.0, **k)),
+    ],
+)
+def test_bowl_conserves_energy(name, tolerance, bowl):
     # Pendulum without a rod: the bowl does no work. Second order: (omega h)^2 / 24 ~ 1e-5 of the energy per swing.
-    sim = drop(SOLVERS[name](), 1 / 240, pm.Sphere(inside=True, friction=0), x=(0.8, -0.6, 0))
+    sim = drop(SOLVERS[name](), 1 / 240, bowl(inside=True, friction=0), x=(0.8, -0.6, 0))
     start, lowest = sim.system.energy().total, 0.0
     for _ in range(480):
         sim.step()
@@ -231,3 +245,48 @@ def test_a_net_falls_on_a_sphere(solver):
         assert ball.distance(system.particles.x, sim.t).min() >= -1e-9
     assert (ball.distance(system.particles.x, sim.t) < 1e-3).sum() >= 4
     assert system.particles.x[:, 1].max() > 0.25
+
+
+@pytest.mark.parametrize(
+    ("name", "contact"),
+    [("leapfrog", "swept"), ("rk4", "discrete"), ("dopri5", "swept"), ("implicit_euler", "discrete")],
+)
+def test_stays_where_it_hit_a_sticky_surface(name, contact):
+    # A ceiling that moves to and fro: neither gravity nor its acceleration tears the particle off.
+    ceiling = pm.Plane(("0.3*sin(5*t)", 1, "0.1*t"), (0, -1, 0), response="stick", contact=contact)
+    sim = drop(SOLVERS[name](), 1 / 240, ceiling, x=(0, 0.5, 0), v=(1, 6, 0))
+    sim.step(40)
+    hit = 0.5 / 6  # nearly straight up
+    local = sim.system.particles.x - ceiling.at(sim.t)
+    late = 6 / 240 if contact == "discrete" else 0.0
+    assert local[0] == pytest.approx([hit - 0.3 * np.sin(5 * hit), 0, -0.1 * hit], abs=0.01 + late)
+    np.testing.assert_allclose(sim.system.particles.v[0], ceiling.velocity(sim.t), rtol=1e-12)
+    sim.step(150)
+    np.testing.assert_allclose(sim.system.particles.x - ceiling.at(sim.t), local, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("contact", ["swept", "discrete"])
+def test_a_sticky_ball_at_rest_keeps_every_bit(contact):
+    rng = np.random.default_rng(2)
+    x = rng.normal(size=(50, 3))
+    x *= 2 / np.linalg.norm(x, axis=1)[:, None]
+    ball = pm.Sphere(response="stick", contact=contact)
+    sim = drop(pm.SymplecticEuler(), 1 / 60, ball, x=x, v=-5 * x, forces=[pm.Gravity(), pm.Drag(0.1)])
+    sim.step(60)
+    at = sim.system.particles.x.copy()
+    assert np.abs(ball.distance(at, 0.0)).max() < 1e-4
+    assert not sim.system.particles.v.any()
+    sim.step(100)
+    np.testing.assert_array_equal(sim.system.particles.x, at)
+
+
+def test_slides_along_without_friction():
+    floor = pm.Plane(normal=(-0.6, 0.8, 0), response="slide", restitution=1.0, friction=2.0)
+    sim = drop(pm.Leapfrog(), 1 / 100, floor, x=(-0.06, 0.08, 0), v=(0.6, -0.8, 0.5))
+    sim.step(100)
+    downhill = np.array([-0.8, -0.6, 0])
+    v = sim.system.particles.v[0]
+    hit = 0.1 / (0.5 * G * 0.8)  # of the way 0.1 m against the normal, from above: at most this time
+    assert abs(v @ floor.direction) < 1e-12
+    assert v[2] == pytest.approx(0.5, rel=1e-12)
+    assert v @ downhill == pytest.approx(0.6 * G, abs=0.6 * hit)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, Contact
+from pointmass.collisions.collider import Array, Collider, Contact, Response
 from pointmass.collisions.laws import all_of, along, any_of
 from pointmass.collisions.plane import Plane
 from pointmass.errors import InvalidInput, finite_array
@@ -30,7 +30,7 @@ class Box(Collider):
     center : [m]; a function of t moves it.
     size : lengths of the edges [m], each greater than 0.
     inside : whether the free space is inside.
-    restitution, friction, eps, contact : as for every collider.
+    restitution, friction, eps, contact, response : as for every collider.
     """
 
     def __init__(
@@ -43,8 +43,9 @@ class Box(Collider):
         friction: float = 0.3,
         eps: float = 1e-4,
         contact: Contact = "swept",
+        response: Response = "bounce",
     ) -> None:
-        super().__init__(center, restitution, friction, eps, contact)
+        super().__init__(center, restitution, friction, eps, contact, response)
         self.half = 0.5 * finite_array("size", size, (3,))
         if (self.half <= 0).any():
             raise InvalidInput(f"size = {size} is not allowed: the edges of a box must be greater than 0 [m]")
@@ -87,13 +88,7 @@ class Box(Collider):
         return corners, np.array(FACES, np.int32)
 
     def _wall(self, axis: int, side: float) -> Plane:
-        wall = Plane(
-            normal=-side * np.eye(3)[axis],
-            restitution=self.restitution,
-            friction=self.friction,
-            eps=self.eps,
-            contact=self.contact,
-        )
+        wall = Plane(normal=-side * np.eye(3)[axis], **self.material)
         wall.motion, wall.offset = self.motion, -float(self.half[axis])
         return wall
 

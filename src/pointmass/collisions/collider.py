@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cache
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from pointmass.tracing.functions import Number, Triple
 
 Array = NDArray[np.floating[Any]]
 Contact = Literal["swept", "discrete"]
+Response = Literal["bounce", "stick", "slide", "kill"]
 
 
 class Collider(Described, ABC):
@@ -33,6 +34,10 @@ class Collider(Described, ABC):
     restitution : k_r in [0, 1].
     friction : Coulomb's mu, at least 0.
     eps : how near is in contact [m].
+    response : what becomes of a particle that hits it. "bounce": as above. "stick": it stays where it hit, and so does
+        whoever comes within eps; it moves with the surface, whatever pulls at it. "slide": it loses its velocity into
+        the surface and nothing else, as with k_r = mu = 0. "kill": it stays where it hit until the step ends, and is
+        then taken away. `restitution` and `friction` count for "bounce" alone.
     contact : "swept": nothing tunnels, the time of impact is found; "discrete": the lecture's test at the end of each
         step.
     motion : of the reference point, in time.
@@ -40,13 +45,23 @@ class Collider(Described, ABC):
     bulges : True where the solid is convex (ball, block): a line between two free points may pass through it. False
         where the free space is convex (plane, inside of a sphere).
     curved : False where the surface is flat everywhere, and only there.
+    smooth : True where pictures shade its mesh round.
     """
 
     bulges: ClassVar[bool] = True
     curved: ClassVar[bool] = True
+    smooth: ClassVar[bool] = False
     place: ClassVar[str] = "center"
 
-    def __init__(self, place: Vector, restitution: float, friction: float, eps: float, contact: Contact) -> None:
+    def __init__(
+        self,
+        place: Vector,
+        restitution: float,
+        friction: float,
+        eps: float,
+        contact: Contact,
+        response: Response = "bounce",
+    ) -> None:
         self.motion = Motion(place, self.place)
         self.restitution = number("restitution", restitution, at_least=0, at_most=1)
         self.friction = number("friction", friction, at_least=0)
@@ -54,6 +69,23 @@ class Collider(Described, ABC):
         if contact not in ("swept", "discrete"):
             raise InvalidInput(f"contact = {contact!r} is not allowed: it must be 'swept' or 'discrete'")
         self.contact = contact
+        if response not in get_args(Response):
+            raise InvalidInput(
+                f"response = {response!r} is not allowed: it must be 'bounce', 'stick', 'slide' or 'kill'"
+            )
+        self.response = response
+
+    @property
+    def material(self) -> dict[str, Any]:
+        """Restitution, friction, eps, contact and response, by name."""
+        return {name: getattr(self, name) for name in ("restitution", "friction", "eps", "contact", "response")}
+
+    @property
+    def impact(self) -> tuple[float, float]:
+        """k_r and mu as the response wants them."""
+        if self.response == "bounce":
+            return self.restitution, self.friction
+        return 0.0, np.inf if self.response == "stick" else 0.0
 
     @property
     def name(self) -> str:

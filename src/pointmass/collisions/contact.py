@@ -2,7 +2,8 @@
 
 A particle stands on a surface while it is within eps of it, pressed towards it, and so slow that its next bounce would
 not lift it by eps: |N . v| < sqrt(2 a eps). The forces on it are filtered between calculate and gather: their part
-into the surface is taken away, and Coulomb friction of at most mu times that load works along it.
+into the surface is taken away, and Coulomb friction of at most mu times that load works along it. Where a surface
+makes particles stick, everybody within eps of it stands, and it takes all forces.
 """
 
 from __future__ import annotations
@@ -40,6 +41,8 @@ class Standing:
     given : force of the contact at the last evaluation, shape (k, 3).
     normal : normals there, shape (k, 3).
     pressed, held : whether it was pressed on there, and friction held it in its place.
+    glued : whether the surface makes all of them stick.
+    friction : Coulomb's mu.
     """
 
     surface: Collider
@@ -59,6 +62,8 @@ class Standing:
         self.given, self.normal = np.zeros((k, 3)), np.zeros((k, 3))
         self.pressed, self.held = np.zeros(k, bool), np.zeros(k, bool)
         self.sticks = (self.slide == 0).all(axis=1)
+        self.glued = self.surface.response == "stick"
+        self.friction = self.surface.impact[1]
 
     def motion(self, t: Array) -> tuple[Array, Array]:
         """Place and velocity of the surface at the clocks of all particles, for each row."""
@@ -99,6 +104,8 @@ class Contacts:
         self.standing = []
         a: Array | None = None
         for surface in self.surfaces:
+            if surface.response == "kill":
+                continue
             gap = surface.distance(x, t) - radius
             rows = np.flatnonzero(free & (gap <= surface.eps))
             if len(rows):
@@ -130,7 +137,7 @@ class Contacts:
         blocks: Array = np.tile(np.eye(3), (n, 1, 1))
         for stand in self.standing:
             across = np.eye(3) - stand.normal[:, :, None] * stand.normal[:, None, :]
-            hold = stand.sticks & (stand.surface.friction > 0)
+            hold = stand.sticks & (stand.friction > 0)
             blocks[stand.rows] = np.where(hold[:, None, None], 0, _products(across, blocks[stand.rows]))
         shared = blocks[self._several]
         for _ in range(PASSES.bit_length() - 1):  # to the power of PASSES
@@ -189,6 +196,8 @@ class Contacts:
             lift = rows_dot(a[rows] - surface.acceleration(now), normal) + surface.bending(local, relative)
             slow = np.abs(rows_dot(relative, normal)) <= np.sqrt(2 * surface.eps * np.abs(lift))
             stands = (lift < 0) & slow
+        if surface.response == "stick":
+            stands = np.ones(len(rows), bool)
         rows = rows[stands]
         if len(rows):
             level = np.where(gap < -surface.eps, gap, 0)[stands]
@@ -213,6 +222,9 @@ class Contacts:
         assert a is not None
         rows, surface = stand.rows, stand.surface
         _, motion = stand.motion(t)
+        if stand.glued:
+            v[rows] = motion
+            return
         relative = v[rows] - motion
         relative -= rows_dot(relative, stand.normal)[:, None] * stand.normal
         speed = lengths(relative)
@@ -225,7 +237,7 @@ class Contacts:
             push = a[rows] - surface.acceleration(t[rows])
             along = push - rows_dot(push, stand.normal)[:, None] * stand.normal
             pull = lengths(along)
-            slips = (speed == 0) & (pull * m[rows] > surface.friction * stand.load)
+            slips = (speed == 0) & (pull * m[rows] > stand.friction * stand.load)
             stand.slide = np.where(slips[:, None], directions(along, pull, NONE), stand.slide)
         stand.sticks = (stand.slide == 0).all(axis=1)
 
@@ -246,20 +258,28 @@ class Contacts:
 
     def _bear(self, stand: Standing, carried: Array, bend: Array, f: Array, friction: bool, go: Mask) -> Mask:
         """Give each contact the force that it bears now; where that is another than before."""
-        rows, normal = stand.rows, stand.normal
-        free = f[rows] - stand.given - carried
+        free = f[stand.rows] - stand.given - carried
+        if stand.glued:
+            stand.held = stand.held | go
+            return self._give(stand, -free, f, go)
+        normal = stand.normal
         into = rows_dot(free, normal)
         load = -(into + bend)
         if self.lagged:
-            stand.pressed = np.ones(len(rows), bool)
+            stand.pressed = np.ones(len(load), bool)
         else:
             stand.pressed = np.where(go, load > 0, stand.pressed)
             load = np.where(load > 0, load, 0)
         given = load[:, None] * normal
-        if friction and self.order == 2 and stand.surface.friction > 0:
+        if friction and self.order == 2 and stand.friction > 0:
             force, held = self._friction(stand, free - into[:, None] * normal, load)
             given = given + force
             stand.held = np.where(go, held, stand.held)
+        return self._give(stand, given, f, go)
+
+    def _give(self, stand: Standing, given: Array, f: Array, go: Mask) -> Mask:
+        """Change the force of contacts to `given`; where that is another than before."""
+        rows = stand.rows
         change = given - stand.given
         f[rows] = np.where(go[:, None], f[rows] + change, f[rows])
         stand.given = np.where(go[:, None], given, stand.given)
@@ -269,11 +289,11 @@ class Contacts:
     def _friction(self, stand: Standing, along: Array, load: Array) -> tuple[Array, Mask]:
         """Friction against the force `along` a surface, or against the slide, and whom it holds."""
         if self.lagged:
-            most = stand.surface.friction * stand.load
+            most = stand.friction * stand.load
             held = stand.sticks
             hold = along
         else:
-            most = stand.surface.friction * load
+            most = stand.friction * load
             size = lengths(along)
             held = stand.sticks & (size <= most)
             hold = np.minimum(most / np.where(size > 0, size, 1), 1)[:, None] * along
@@ -283,7 +303,7 @@ class Contacts:
 
     def _hold(self, stand: Standing, x: Array, v: Array, t: Array, h: Array) -> None:
         """Put those that friction held, or stopped, where they are to be."""
-        if self.order == 1 or stand.surface.friction == 0:
+        if not stand.glued and (self.order == 1 or stand.friction == 0):
             return
         rows = stand.rows
         place, motion = stand.motion(t)

@@ -25,6 +25,6 @@ def bounce(
         hit[rows] = rows_dot(normal, v[rows] - motion) < 0
         rows, normal = rows[hit[rows]], normal[hit[rows]]
         motion = surface.velocity(t[rows])
-        v[rows] = respond(v[rows], normal, motion, surface.restitution, surface.friction)
+        v[rows] = respond(v[rows], normal, motion, *surface.impact)
         x[rows] -= np.where(gap[rows] < 0, gap[rows], 0)[:, None] * normal
     return hit

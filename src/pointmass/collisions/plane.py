@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, Contact, unit
+from pointmass.collisions.collider import Array, Collider, Contact, Response, unit
 from pointmass.collisions.laws import all_of
 from pointmass.laws.parameter import Vector
 from pointmass.tracing.functions import Number, Triple, dot
@@ -21,7 +21,7 @@ class Plane(Collider):
     ----------
     point : any point of it [m]; a function of t moves it.
     normal : direction of the free side.
-    restitution, friction, eps, contact : as for every collider.
+    restitution, friction, eps, contact, response : as for every collider.
     """
 
     bulges: ClassVar[bool] = False
@@ -37,8 +37,9 @@ class Plane(Collider):
         friction: float = 0.3,
         eps: float = 1e-4,
         contact: Contact = "swept",
+        response: Response = "bounce",
     ) -> None:
-        super().__init__(point, restitution, friction, eps, contact)
+        super().__init__(point, restitution, friction, eps, contact, response)
         self.direction = unit("normal", normal)
         self.offset = 0.0
 

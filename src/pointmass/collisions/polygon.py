@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, Contact
+from pointmass.collisions.collider import Array, Collider, Contact, Response
 from pointmass.collisions.laws import all_of, along, any_of
 from pointmass.errors import InvalidInput, finite_array, number
 from pointmass.laws.parameter import Vector
@@ -24,7 +24,7 @@ class Polygon(Collider):
     vertices : corners in order around it [m], shape (k, 3), k at least 3, flat and convex.
     thickness : of the plate [m], greater than 0; the vertices are in its middle and its rim is round.
     shift : moves the whole plate [m]; a function of t.
-    restitution, friction, eps, contact : as for every collider.
+    restitution, friction, eps, contact, response : as for every collider.
     """
 
     place: ClassVar[str] = "shift"
@@ -39,8 +39,9 @@ class Polygon(Collider):
         friction: float = 0.3,
         eps: float = 1e-4,
         contact: Contact = "swept",
+        response: Response = "bounce",
     ) -> None:
-        super().__init__(shift, restitution, friction, eps, contact)
+        super().__init__(shift, restitution, friction, eps, contact, response)
         self.vertices = finite_array("vertices", vertices, (None, 3))
         self.half = 0.5 * number("thickness", thickness, above=0, unit="m")
         self.direction, self.outward = self._frame()

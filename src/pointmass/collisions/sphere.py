@@ -8,8 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, Contact
-from pointmass.collisions.laws import UP, all_of, along
+from pointmass.collisions.collider import Array, Collider, Contact, Response
+from pointmass.collisions.laws import all_of, along
+from pointmass.collisions.revolution import AROUND, revolved
 from pointmass.errors import number
 from pointmass.laws.parameter import Vector
 from pointmass.tracing.functions import Number, Triple, dot, length, where
@@ -23,10 +24,11 @@ class Sphere(Collider):
     center : [m]; a function of t moves it.
     radius : [m], greater than 0.
     inside : whether the free space is inside.
-    restitution, friction, eps, contact : as for every collider.
+    restitution, friction, eps, contact, response : as for every collider.
     """
 
     bulges: ClassVar[bool]
+    smooth: ClassVar[bool] = True
 
     def __init__(
         self,
@@ -38,8 +40,9 @@ class Sphere(Collider):
         friction: float = 0.3,
         eps: float = 1e-4,
         contact: Contact = "swept",
+        response: Response = "bounce",
     ) -> None:
-        super().__init__(center, restitution, friction, eps, contact)
+        super().__init__(center, restitution, friction, eps, contact, response)
         self.radius = number("radius", radius, above=0, unit="m")
         self.bulges = not inside  # type: ignore[misc]  # a property of this sphere
         self.sign = -1.0 if inside else 1.0
@@ -69,21 +72,5 @@ class Sphere(Collider):
         return self.radius, self.sign
 
     def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:
-        return sphere_mesh(self.radius)
-
-
-def sphere_mesh(radius: float, rings: int = 32) -> tuple[Array, NDArray[np.int32]]:
-    """A sphere of triangles between circles of latitude."""
-    around = 2 * rings
-    latitude, longitude = np.linspace(0, np.pi, rings + 1)[1:-1], np.linspace(0, 2 * np.pi, around, endpoint=False)
-    a, b = np.meshgrid(latitude, longitude, indexing="ij")
-    corners = np.stack([np.sin(a) * np.cos(b), np.cos(a), np.sin(a) * np.sin(b)], axis=-1).reshape(-1, 3)
-    north, south = len(corners), len(corners) + 1
-    i, j = np.meshgrid(np.arange(rings - 2), np.arange(around), indexing="ij")
-    here, right = i * around + j, i * around + (j + 1) % around
-    quads = np.stack([here, right, right + around, here + around], axis=-1).reshape(-1, 4)
-    k, last = np.arange(around), (rings - 2) * around
-    top = np.stack([np.full(around, north), (k + 1) % around, k], axis=1)
-    bottom = np.stack([np.full(around, south), last + k, last + (k + 1) % around], axis=1)
-    faces = np.concatenate([top, quads[:, [0, 1, 2]], quads[:, [0, 2, 3]], bottom])
-    return radius * np.concatenate([corners, np.outer((1, -1), UP)]), faces.astype(np.int32)
+        latitude = np.linspace(0, np.pi, AROUND // 2 + 1)
+        return revolved(self.radius * np.sin(latitude), self.radius * np.cos(latitude))

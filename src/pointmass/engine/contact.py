@@ -18,9 +18,10 @@ For one particle, in the order of the reference path (a pinned one is left out, 
     evict(P, clock, x, v, radius, x at the start of the whole step, when that was) -> x, v
 
 `strike` hit something where it returns more events than it was given; then and where `bounce` hit, the solver starts
-anew. One that is `alone` goes on from `clock`. One of a larger island has finished its step; if it has hit something
-and events <= MOST_EVENTS, the pull that it did not feel is to be paid (see ReferenceEngine._pay) before `evict`: its
-jump is v minus the velocity of the chord, (x1 - x0) / h with the solver's x1, and `ground` that of what it hit.
+anew. Events and hits from KILLED on are deadly: the particle is to be taken away when the step ends. One that is
+`alone` goes on from `clock`. One of a larger island has finished its step; if it has hit something and events <=
+MOST_EVENTS, the pull that it did not feel is to be paid (see ReferenceEngine._pay) before `evict`: its jump is v minus
+the velocity of the chord, (x1 - x0) / h with the solver's x1, and `ground` that of what it hit.
 
     clear(P, x0, v0, x1, v1, t, h, radius) -> bool
 
@@ -33,26 +34,29 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.collisions import contact, swept
-from pointmass.collisions.collider import Collider
+from pointmass.collisions.collider import Collider, Response
 from pointmass.engine.printing import indented, literal, statements
-from pointmass.engine.reference import EVICTIONS, MOST_EVENTS
+from pointmass.engine.reference import EVICTIONS, KILLED, MOST_EVENTS
 from pointmass.laws.parameter import Component, Parameter
 from pointmass.tracing.columns import expanded
 from pointmass.tracing.trace import Traced, vector_names
 
 TABLE = (  # columns of a surface's row
-    *("KIND", "SWEPT", "MOTION", "BULGES", "FLAT", "RESTITUTION", "FRICTION", "NEAR", "ROOM"),
+    *("KIND", "SWEPT", "MOTION", "BULGES", "FLAT", "RESPONSE", "RESTITUTION", "FRICTION"),
+    *("NEAR", "ROOM"),
     *("PLACE", "", "", "SHAPE"),
 )
 RECORD = {  # of a contact, with the size of each
     **{"ON": 1, "LEVEL": 1, "START": 3, "SLIDE": 3, "SPEED": 1, "LOAD": 1, "GIVEN": 3, "NORMAL": 3},
     **{"PRESSED": 1, "HELD": 1, "STICKS": 1, "CARRIED": 3, "BEND": 1},
 }
+RESPONSES = get_args(Response)
 MARK = "# --- printed from here on\n"
 ROUNDING = {"float64": 1e-13, "float32": 1e-6}  # of the places between which `clear` looks, on top of eps
 PATH = [f"{p}{end}" for end in "01" for p in ("x", "y", "z", "u", "v", "w")]
@@ -93,7 +97,7 @@ class ContactText:
             room = s.eps + ROUNDING[self._dtype] * float(np.abs(place).sum())
             flat = not s.curved and not s.moves
             numbers: list[float] = [self._kinds.index(s.laws), s.contact == "swept", motion, s.bulges, flat]
-            numbers += [s.restitution, s.friction, s.eps, room, *place, *s.shape]
+            numbers += [RESPONSES.index(s.response), *s.impact, s.eps, room, *place, *s.shape]
             row[: len(numbers)] = numbers
         return result
 
@@ -272,6 +276,7 @@ def _constants(order: int, lagged: bool, dtype: str) -> list[str]:
     numbers |= {"SQUARINGS": contact.PASSES.bit_length() - 1, "MOST_CHORDS": float(swept.MOST_CHORDS)}
     numbers |= {"NEWTON_STEPS": swept.NEWTON_STEPS, "ROOT_STEPS": swept.ROOT_STEPS, "BACK_STEPS": swept.BACK_STEPS}
     numbers |= {"RESOLUTION": swept.RESOLUTION}
+    numbers |= {"STICK": RESPONSES.index("stick"), "KILL": RESPONSES.index("kill"), "KILLED": KILLED}
     numbers |= {"MOST_EVENTS": MOST_EVENTS, "EVICTIONS": EVICTIONS, "SETTLED": contact.SETTLED}
     rounding = contact.STILL * float(np.finfo(dtype).eps)
     numbers |= {"ROUND": rounding, "CREEP": max(contact.CREEP, rounding)}

@@ -45,7 +45,7 @@ def distance(P, k, t, x, y, z):
 def near(P, t, x, y, z, radius):
     """Whether a particle is within reach of a surface: if so, `find` wants to know its acceleration."""
     for k in range(len(P)):
-        if distance(P, k, t, x, y, z) - radius <= P[k, NEAR]:
+        if P[k, RESPONSE] != KILL and distance(P, k, t, x, y, z) - radius <= P[k, NEAR]:
             return True
     return False
 
@@ -58,7 +58,7 @@ def find(P, C, o, t, x, y, z, vx, vy, vz, m, ax, ay, az, radius):
         px, py, pz = place_of(P, k, t)
         lx, ly, lz = x - px, y - py, z - pz
         gap = gap_of(P, k, lx, ly, lz) - radius
-        if not gap <= P[k, NEAR]:
+        if P[k, RESPONSE] == KILL or not gap <= P[k, NEAR]:
             continue
         nx, ny, nz = normal_of(P, k, lx, ly, lz)
         gx, gy, gz = ground_of(P, k, t)
@@ -71,7 +71,7 @@ def find(P, C, o, t, x, y, z, vx, vy, vz, m, ax, ay, az, radius):
             lift = dot3(ax - bx, ay - by, az - bz, nx, ny, nz) + bending_of(P, k, lx, ly, lz, ux, uy, uz)
             slow = abs(dot3(ux, uy, uz, nx, ny, nz)) <= np.sqrt(2 * P[k, NEAR] * abs(lift))
             stands = lift < 0 and slow
-        if stands:
+        if stands or P[k, RESPONSE] == STICK:
             r = o + 1 + RECORD * count
             count += 1
             C[r + ON] = k
@@ -107,6 +107,8 @@ def choose_slide(P, C, r, t, vx, vy, vz, m, ax, ay, az):
     """Contacts._choose_slide; returns the velocity."""
     k = int(C[r])
     gx, gy, gz = ground_of(P, k, t)
+    if P[k, RESPONSE] == STICK:
+        return gx, gy, gz
     nx, ny, nz = C[r + NORMAL], C[r + NORMAL + 1], C[r + NORMAL + 2]
     ux, uy, uz = vx - gx, vy - gy, vz - gz
     across = dot3(ux, uy, uz, nx, ny, nz)
@@ -175,6 +177,9 @@ def bear_one(P, C, r, friction, fx, fy, fz):
     nx, ny, nz = C[r + NORMAL], C[r + NORMAL + 1], C[r + NORMAL + 2]
     qx, qy, qz = fx - C[r + GIVEN], fy - C[r + GIVEN + 1], fz - C[r + GIVEN + 2]
     qx, qy, qz = qx - C[r + CARRIED], qy - C[r + CARRIED + 1], qz - C[r + CARRIED + 2]
+    if P[k, RESPONSE] == STICK:
+        C[r + HELD] = 1.0
+        return give(C, r, -qx, -qy, -qz, fx, fy, fz)
     into = dot3(qx, qy, qz, nx, ny, nz)
     load = -(into + C[r + BEND])
     if LAGGED:
@@ -199,6 +204,12 @@ def bear_one(P, C, r, friction, fx, fy, fz):
         if not sticks:
             hx, hy, hz = most * C[r + SLIDE], most * C[r + SLIDE + 1], most * C[r + SLIDE + 2]
         wx, wy, wz = wx + -hx, wy + -hy, wz + -hz
+    return give(C, r, wx, wy, wz, fx, fy, fz)
+
+
+@njit(**FLAGS)
+def give(C, r, wx, wy, wz, fx, fy, fz):
+    """Contacts._give."""
     dx, dy, dz = wx - C[r + GIVEN], wy - C[r + GIVEN + 1], wz - C[r + GIVEN + 2]
     C[r + GIVEN], C[r + GIVEN + 1], C[r + GIVEN + 2] = wx, wy, wz
     return fx + dx, fy + dy, fz + dz, length3(dx, dy, dz) > SETTLED * length3(wx, wy, wz)
@@ -247,7 +258,7 @@ def settle(P, C, o, t, h, x, y, z, vx, vy, vz, radius):
     for c in range(count):
         r = o + 1 + RECORD * c
         k = int(C[r])
-        if ORDER == 1 or P[k, FRICTION] == 0:
+        if P[k, RESPONSE] != STICK and (ORDER == 1 or P[k, FRICTION] == 0):
             continue
         px, py, pz = place_of(P, k, t)
         gx, gy, gz = ground_of(P, k, t)
@@ -310,9 +321,9 @@ def respond(vx, vy, vz, nx, ny, nz, gx, gy, gz, restitution, friction):
 def bounce(P, t, x, y, z, vx, vy, vz, radius):
     """The lecture's test at the end of a step, for surfaces of discrete contact: discrete.bounce.
 
-    Returns the state, and whether something was hit.
+    Returns the state, and 1 if something was hit, KILLED if that was deadly, else 0.
     """
-    hit = False
+    hit = 0
     for k in range(len(P)):
         if P[k, SWEPT] != 0 or ORDER == 1:
             continue
@@ -323,7 +334,7 @@ def bounce(P, t, x, y, z, vx, vy, vz, radius):
         nx, ny, nz = normal_of(P, k, x - px, y - py, z - pz)
         gx, gy, gz = ground_of(P, k, t)
         if dot3(nx, ny, nz, vx - gx, vy - gy, vz - gz) < 0:
-            hit = True
+            hit = max(hit, KILLED if P[k, RESPONSE] == KILL else 1)
             vx, vy, vz = respond(vx, vy, vz, nx, ny, nz, gx, gy, gz, P[k, RESTITUTION], P[k, FRICTION])
             sunk = gap if gap < 0 else 0.0
             x, y, z = x - sunk * nx, y - sunk * ny, z - sunk * nz
@@ -589,7 +600,7 @@ def strike(P, C, o, alone, events, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w
         vx, vy, vz = velocity(s, h, x0, u0, x1, u1), velocity(s, h, y0, v0, y1, v1), velocity(s, h, z0, w0, z1, w1)
         now = t0 + s * h
         end = t0 + h
-        events += 1
+        events += (1 + KILLED) if P[k, RESPONSE] == KILL else 1
         px, py, pz = place_of(P, k, now)
         nx, ny, nz = normal_of(P, k, x - px, y - py, z - pz)
         gx, gy, gz = ground_of(P, k, now)

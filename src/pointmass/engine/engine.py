@@ -78,6 +78,7 @@ class Engine:
     wanted : whether kernels are wanted.
     reference : the engine that does everything, in NumPy.
     fastest, farthest : largest |v| [m/s] and |x| [m] of any component after the last span.
+    died : rows of the particles that a surface killed in the last span, ascending; they are to be taken away.
     """
 
     system: ParticleSystem
@@ -86,6 +87,7 @@ class Engine:
     reference: ReferenceEngine = field(init=False)
     fastest: float = 0.0
     farthest: float = 0.0
+    died: Rows = field(default_factory=lambda: np.zeros(0, np.intp))
     _before: tuple[Array, Array] | None = None
     _looked: bool = False  # whether the last step can no longer be looked into
     _last: Any = None  # span, births and ids, and what the reference path knew before it
@@ -184,6 +186,11 @@ class Engine:
         islands = self.system.island_of_particle
         return len(islands) > 0 and int(islands.max()) + 1 < len(islands)
 
+    @property
+    def deadly(self) -> bool:
+        """Whether a surface kills."""
+        return any(collider.response == "kill" for collider in self.system.colliders)
+
     def run(self, span: Span, births: Array | None, look_inside: bool) -> bool:
         """Take the system over a span by its kernels; False if something went wrong: then `restore` it.
 
@@ -193,6 +200,7 @@ class Engine:
         look_inside : whether `state_at` will be asked for a time within the last step.
         """
         p = self.system.particles
+        self.died = self.died[:0]
         self._last = span, births, p.id, self.reference.left()
         before = self._room()
         kernels = [g.members for g in self._grouped(births, span.start) if g.rows is None]
@@ -238,6 +246,7 @@ class Engine:
             if group.rows is not None:
                 p.x[group.rows], p.v[group.rows] = x.reshape(-1, 3), v.reshape(-1, 3)
         self.farthest, self.fastest = np.max([o.reach for o in outcomes], axis=0).tolist()
+        self.died = np.unique(np.concatenate([self.died, *(o.died for o in outcomes)]))
         works = [o.stats for o in outcomes]
         work = sum(works, Stats())
         work.steps, work.evaluations = max(w.steps for w in works), max(w.evaluations for w in works)
@@ -348,6 +357,7 @@ class Engine:
         """One step on the reference path: see `ReferenceEngine.step`."""
         p = self.system.particles
         self.reference.step(span.start, span.end, births)
+        self.died = self.reference.died
         self._looked = False
         self.farthest = float(np.abs(p.x).max(initial=0.0))
         self.fastest = float(np.abs(p.v).max(initial=0.0))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pointmass.engine.contact import ContactText
 from pointmass.engine.printing import function, indented
-from pointmass.engine.reference import MOST_EVENTS
+from pointmass.engine.reference import KILLED, MOST_EVENTS
 
 WORK = ("x0", "v0", "bx", "px", "pv", "ground", "a1", "a2")  # arrays of an island, each of length 3n
 XYZ = ("x", "y", "z")
@@ -82,8 +82,9 @@ class Impacts:
             "        hits += 1",
             f"        paid[i] = 1 if not alone and e <= {MOST_EVENTS} else 0",
             "        events[i] = e",
-            "    if struck:",
+            "    if struck > 0:",
             "        hits += 1",
+            f"        events[i] += {KILLED} if struck == {KILLED} and not clock < end else 0",
             "    if alone:",
             "        when[0] = clock",
             *indented([f"ground[j + {k}] = g{a}" for k, a in enumerate(XYZ)], 1),

@@ -7,7 +7,7 @@ island, loop by loop.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -24,6 +24,7 @@ from pointmass.engine.implicit import implicit_text
 from pointmass.engine.pairs import FULL, PairArrays
 from pointmass.engine.phases import REACHED
 from pointmass.engine.printing import function, indented
+from pointmass.engine.reference import KILLED
 from pointmass.engine.steps import StepText, each, step_text
 from pointmass.engine.threads import spread
 from pointmass.solvers.advance import NEARLY, SET_BACKS, Stats
@@ -76,12 +77,14 @@ class Outcome:
     good : whether nothing went wrong.
     reach : largest |x| [m] and |v| [m/s] of a component.
     again : whether it had too little room, and has enough for another try now.
+    died : rows of the particles that a surface killed.
     """
 
     good: bool
     reach: Array
     stats: Stats
     again: bool = False
+    died: Rows = field(default_factory=lambda: np.zeros(0, np.intp))
 
 
 class IslandKernel:
@@ -291,6 +294,11 @@ class IslandKernel:
         call = self.call.replace(", x, v, ", ", xi, vi, ")
         for name in self.memory:
             call = call.replace(f", {name},", f", {name}_,")
+        alive, dead, deaths = "", [], []
+        if self.impacts is not None:  # an island of more than one particle makes single steps where somebody may die
+            alive, dead = " and alive", ["alive = True"]
+            deaths = ["for i in range(n):", f"    if events[i] >= {KILLED}:", "        died[base + i] = 1"]
+            deaths.append("        alive = False")
         island = [
             "base = first[island]",
             "n = first[island + 1] - base",
@@ -303,12 +311,14 @@ class IslandKernel:
             "done = work[island]",
             *["known[0] = 0"] * self.step.keeps,
             "bad = 0",
+            *dead,
             "for s in range(count):",
             "    clock = max(t0 + (k0 + s) * dt, birth[island])",
             "    end = t0 + (k0 + s + 1) * dt",
             *indented(anew, 1),
-            "    if clock < end and bad == 0:",
+            f"    if clock < end and bad == 0{alive}:",
             f"        bad = advance({call})",
+            *indented(deaths, 2),
             "far, fast = reached(xi, 0, 3 * n), reached(vi, 0, 3 * n)",
             f"status[island] = bad if far < np.inf and fast < np.inf else {NOT_FINITE}",
             "reach[island, 0] = far",
@@ -316,7 +326,8 @@ class IslandKernel:
         ]
         layouts = [*self.step.arrays, "first_slice"] if kinds else []
         data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers), *layouts, *tiles.values()])
-        grid = ", ".join([*self.memory, "birth, t0, dt, k0, count, lengths, controls, work, status, reach"])
+        mortal = ["died"] * (self.impacts is not None)
+        grid = ", ".join([*self.memory, "birth, t0, dt, k0, count, lengths, controls, work, status, reach", *mortal])
         given = f"lo, hi, first, x, v, {data}, {grid}"
         return entry_text(self.scratch, given, ["for island in range(lo, hi):", *indented(island, 1)])
 
@@ -412,6 +423,7 @@ class IslandMembers:
         dtype = self.kernel.system.particles.dtype
         data = deriv.binder.data(count, self.order)
         contact = [] if deriv.contact is None else [deriv.contact.table()]
+        died = np.zeros(count, np.int64)
         starts, most = [], [int(np.diff(self.first).max(initial=0))]
         for k, family in enumerate(deriv.families):
             data += [self.tiles[k].nodes, family.tiled.array(len(self.tiled[k]), dtype, self.tiled[k])]
@@ -456,6 +468,7 @@ class IslandMembers:
             work,
             status,
             reach,
+            *[died] * len(contact),
         )
         kernel = self.kernel.functions["run"]
         scratch = self.kernel.functions["scratch"]
@@ -473,7 +486,7 @@ class IslandMembers:
         if (status & FULL).any():
             for pairs in self.pairs:
                 pairs.enlarge()
-        return Outcome(not status.any(), reach.max(axis=0), stats, bool((status == FULL).any()))
+        return Outcome(not status.any(), reach.max(axis=0), stats, bool((status == FULL).any()), self.rows[died > 0])
 
     def _view(self, memory: Memory, name: str, part: int) -> Array:
         """The part of a memory entry that belongs to x or to v, shape (n, 3)."""

@@ -28,6 +28,7 @@ from pointmass.system import ParticleSystem
 Rows = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 MOST_EVENTS = 8  # impacts of one particle in one step; then it rests until the step ends
+KILLED = 2**32  # is added to its impacts where one is its last
 EVICTIONS = 16  # passes that put back what other surfaces pushed into one
 
 
@@ -55,18 +56,21 @@ class ReferenceEngine:
     ----------
     memory : what the solver remembers between steps.
     stats : work done so far.
+    died : rows of the particles that a surface killed in the last step, to be taken away.
     """
 
     system: ParticleSystem
     solver: Solver
     memory: Memory = field(default_factory=dict)
     stats: Stats = field(default_factory=Stats)
+    died: Rows = field(default_factory=lambda: np.zeros(0, np.intp))
 
     def __post_init__(self) -> None:
         surfaces = surfaces_of(self.system)
         self._swept = [s for s in surfaces if s.contact == "swept"]
         self._discrete = [s for s in surfaces if s.contact == "discrete"] if self.system.order == 2 else []
         self._walls = [*self._swept, *self._discrete]
+        self._last_hits = np.array([1 + KILLED * (s.response == "kill") for s in self._swept], np.int64)
         self._contacts = Contacts(surfaces, self.system.order, self.solver.implicit)
         self._pieces: list[Piece] = []
         self._ids = self.system.particles.id
@@ -90,7 +94,7 @@ class ReferenceEngine:
         self._pieces = []
         self.memory = self._fitted_memory()
         self._ids, self._islands = system.particles.id, system.island_of_particle
-        self._events = np.zeros(len(self._ids), np.intp)
+        self._events = np.zeros(len(self._ids), np.int64)
         self._ground = np.zeros((len(self._ids), 3))  # velocity of the surface that each hit last
         self._alone = np.bincount(self._islands)[self._islands] == 1
         clock = None if births is None else self._island_clock(births)
@@ -108,6 +112,7 @@ class ReferenceEngine:
         finally:
             system.filter = None
         self.stats = self.stats + stats
+        self.died = np.flatnonzero(self._events >= KILLED)
         system.set_state(y, t1)
         if self.memory:
             self._left = self._touchable()
@@ -233,16 +238,20 @@ class ReferenceEngine:
         x, v = system.split(y)
         self._contacts.settle(x, v, end, length, p.radius)
         moved = (length > 0) & ~p.pinned
+        doomed = np.zeros(len(p), bool)
         for surface in self._discrete:
-            reset[islands[bounce(surface, x, v, end, p.radius, moved)]] = True
+            hit = bounce(surface, x, v, end, p.radius, moved)
+            reset[islands[hit]] = True
+            doomed |= hit & (surface.response == "kill")
         if self._swept:
             paths, planned = self._paths(step, x, v, start, length), (x.copy(), v.copy())
-            hit = self._impacts(paths, np.flatnonzero(moved), x, v, clock)
-            reset[islands[hit]] = True
-            linked = np.unique(hit[~self._alone[hit] & ~self._tired(hit)])
+            rows = self._impacts(paths, np.flatnonzero(moved), x, v, clock)
+            reset[islands[rows]] = True
+            linked = np.unique(rows[~self._alone[rows] & ~self._tired(rows)])
             if len(linked):
                 self._pay(linked, paths.v1[linked], planned, x, v, end)
         now = np.where(np.isnan(clock[islands]), end, clock[islands])
+        self._events[doomed & (now == end)] += KILLED
         self._evict(x, v, now, moved)
         fix = y - step.y1
         _by_particle(fix, system.order)[:, ~np.isnan(clock[islands])] = 0
@@ -285,7 +294,7 @@ class ReferenceEngine:
         v[rows] -= (speed - left)[:, None] * away
 
     def _tired(self, rows: Rows) -> Mask:
-        """Who has hit so much in this step that it rests until the end."""
+        """Who has hit so much in this step, or so badly, that it rests until the end."""
         result: Mask = self._events[rows] > MOST_EVENTS
         return result
 
@@ -324,12 +333,12 @@ class ReferenceEngine:
         """Put particles at their impact with their new velocity; returns those that fly on within this piece."""
         place, speed, now = paths.position(theta), paths.velocity(theta), paths.time(theta)
         end = paths.t0 + paths.h
-        self._events[rows] += 1
+        self._events[rows] += self._last_hits[which]
         tired = self._tired(rows)
         for k in np.unique(which):
             surface, at = self._swept[k], which == k
             normal, motion = surface.normal(place[at], now[at]), surface.velocity(now[at])
-            speed[at] = respond(speed[at], normal, motion, surface.restitution, surface.friction)
+            speed[at] = respond(speed[at], normal, motion, *surface.impact)
             self._ground[rows[at]] = motion
             rest = at & tired
             speed[rest] = surface.velocity(end[rest])

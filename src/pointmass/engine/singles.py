@@ -21,6 +21,7 @@ from pointmass.engine.forces import unary
 from pointmass.engine.island import NOT_FINITE, IslandKernel, Outcome, Span, entry_text
 from pointmass.engine.phases import REACHED
 from pointmass.engine.printing import function, indented, literal
+from pointmass.engine.reference import KILLED
 from pointmass.engine.threads import spread
 from pointmass.laws.unary import UnaryForce
 from pointmass.solvers.advance import Stats
@@ -305,6 +306,9 @@ class SinglesKernel:
             for k in range(3)
         ]
         begin = ["clock = max(clock, birth[lo + i])"] if self.births else []
+        mortal = island.deriv.contact is not None
+        alive = " and died[lo + i] == 0" if mortal else ""
+        death = [f"died[lo + i] = 1 if events[0] >= {KILLED} else 0"] if mortal else []
         # Most of the steps that somebody waited for are clear after all: only those that are not take the long way.
         easy = f"clock == t0 + j * dt and lane(np.uintp(i), {', '.join(self.shared)}, clock, end)"
         return [
@@ -312,18 +316,19 @@ class SinglesKernel:
             f"    if not somebody_waits(s, bunch, {BUNCH}):",
             "        continue",
             f"    for i in range(bunch, bunch + {BUNCH}):",
-            f"        if {waiting} != 0 and i < m:",
+            f"        if {waiting} != 0 and i < m{alive}:",
             "            for j in range(k, k + stride):",
             "                clock = t0 + j * dt",
             "                end = t0 + (j + 1) * dt",
             *indented(begin, 4),
             f"                {waiting} = R(0)",
-            f"                if clock < end and bad == 0 and not ({easy}):",
+            f"                if clock < end and bad == 0{alive} and not ({easy}):",
             *indented([f"{local} = {entry}" for local, entry in state], 5),
             *["                    known[0] = 0"] * island.step.keeps,
             f"                    bad = advance({call})",
+            *indented(death, 5),
             *indented([f"{entry} = {local}" for local, entry in state], 5),
-            f"        {waiting} = R(0)",
+            f"        {waiting} = {'R(1) if i < m and died[lo + i] != 0 else ' if mortal else ''}R(0)",
         ]
 
     def _run(self, unrolled: list[int]) -> str:
@@ -347,7 +352,8 @@ class SinglesKernel:
         if self.births:
             began += ["late = -np.inf", "for i in range(m):", "    late = max(late, birth[lo + i])"]
             hold = ["if late > t0 + k * dt:", "    for i in range(m):"]
-            hold += [f"        s[{6 * W} + i] = R(1) if birth[lo + i] > t0 + k * dt else R(0)"]
+            dead = " or died[lo + i] != 0" if self.system.colliders else ""
+            hold += [f"        s[{6 * W} + i] = R(1) if birth[lo + i] > t0 + k * dt{dead} else R(0)"]
         steps = [*hold, "stride = 1"]
         for u in unrolled:
             times = ", ".join(f"t0 + (k + {j}) * dt" for j in range(u + 1))
@@ -356,6 +362,7 @@ class SinglesKernel:
         steps = ["while k < k0 + count:", *indented([*steps, *caught, "k += stride"], 1)]
         arrays = [*motion.binder.arrays, *(["F"] if self.system.colliders else [])]
         given = f"first, last, x, v, x_kept, v_kept, {', '.join(arrays)}, birth, t0, dt, k0, count, status, reach"
+        given += ", died" if self.system.colliders else ""
         made = [f"s = np.ones({(STATE + columns) * W}, R)", *prepared]
         own = [f"    s[{(STATE + c) * W} + i] = C[{c}, lo + i]" for c in range(columns)]
         tile = [
@@ -426,7 +433,10 @@ class SingleMembers:
         status, reach = np.zeros(tiles, np.int64), np.zeros((tiles, 2), x.dtype)
         grid = (span.t0, span.dt, span.first, span.count)
         kernel, scratch = self.kernel.functions["run"], self.kernel.functions["scratch"]
-        arrays = (x, v, *kept, *data, *grid, status, reach)
+        died = np.zeros(count, np.int64)
+        mortal = [died] if self.kernel.system.colliders else []
+        arrays = (x, v, *kept, *data, *grid, status, reach, *mortal)
         spread(lambda lo, hi: kernel(lo, hi, *arrays, *scratch([1])), tiles, GRAIN)
         work = Stats(span.count, 0, span.count * motion.evaluations)
-        return Outcome(not status.any(), reach.max(axis=0).astype(np.float64), work)
+        far = reach.max(axis=0).astype(np.float64)
+        return Outcome(not status.any(), far, work, died=self.rows[died > 0])
