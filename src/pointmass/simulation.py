@@ -339,11 +339,10 @@ class Simulation:
 
     def _bury(self, born: Born, t1: float) -> None:
         """Take away those whose time has come by t1, whom a surface killed, who are in a zone, and who are too many."""
-        for k, birth in ((k, birth) for births in born for k, birth in enumerate(births)):
-            mortal = np.isfinite(birth.lifetime)
-            if mortal.any():
-                self._mortal = np.append(self._mortal, birth.ids(k)[mortal])
-                self._death = np.append(self._death, birth.death[mortal])
+        new = [(k, birth) for births in born for k, birth in enumerate(births) if np.isfinite(birth.lifetime).any()]
+        if new:
+            self._mortal = np.concatenate([self._mortal, *(birth.ids(k) for k, birth in new)])
+            self._death = np.concatenate([self._death, *(birth.death for _, birth in new)])
         self._lineage.settle(born, t1)
         p, dead = self.system.particles, self._death <= t1
         rows = p.rows(self._mortal[dead])

@@ -129,6 +129,10 @@ def test_kernels_give_the_bits_of_the_reference_path_in_any_spans():
         frames = list(fast.frames(fps + 1, fps))
         assert_equal(end(slow), end(fast))
         assert len(frames[-1].ids) == len(slow.system.particles)
+    looks = [list(simulation(display(20), compiled=c).frames(70, fps=77)) for c in (False, True)]  # between steps
+    for one, two in zip(*looks, strict=True):
+        np.testing.assert_array_equal(one.ids, two.ids)
+        np.testing.assert_array_equal(one.positions, two.positions)
 
 
 def test_where_particles_act_on_each_other():

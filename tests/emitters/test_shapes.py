@@ -1,6 +1,8 @@
 """Emitters of all shapes: where, when, in which direction, and with which numbers particles are born."""
 
+import copy
 import math
+import pickle
 from itertools import pairwise
 
 import numpy as np
@@ -294,6 +296,15 @@ def test_in_a_scene_file_and_back():
     np.testing.assert_array_equal(a.columns["temperature"], b.columns["temperature"])
 
 
+def test_copies_have_the_same_births():
+    one = pm.BoxEmitter(("t", 0, 0), rate="100*(1 + t)", per_distance=30, bursts=[(0.5, 9)], mass=pm.Spread(1, 0.5))
+    whole = one.births(0, 1, 0, "s")
+    for other in (copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
+        again = other.births(0, 1, 0, "s")
+        np.testing.assert_array_equal(again.time, whole.time)
+        np.testing.assert_array_equal(again.x, whole.x)
+
+
 @pytest.mark.parametrize(
     ("make", "says"),
     [
@@ -309,6 +320,8 @@ def test_in_a_scene_file_and_back():
         (lambda: pm.PointEmitter(bursts=[(1, 2.5)]), r"bursts has the count 2\.5"),
         (lambda: pm.PointEmitter(bursts=[(-1, 2)]), "bursts has the time -1 s"),
         (lambda: pm.PointEmitter(bursts=[3, 4]), "bursts must have shape"),
+        (lambda: pm.PointEmitter(bursts=3), "bursts must be pairs"),
+        (lambda: pm.PointEmitter(attributes=3), "attributes must be numbers by name"),
         (lambda: pm.PointEmitter(speed=pm.Spread(1, 2)), "speed = 1 \\+- 2 is not allowed"),
         (lambda: pm.PointEmitter(speed=pm.Normal(1, -2)), "sd of speed = -2"),
         (lambda: pm.PointEmitter(lifetime=pm.Normal(-1, 2)), "mean of lifetime = -1"),

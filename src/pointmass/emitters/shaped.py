@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from typing import Any, Literal
 
@@ -119,6 +119,8 @@ class ShapedEmitter(Emitter):
         self._inherited = number("inherit", self.inherit)
         self._speed = Quantity("speed", self.speed, at_least=0, unit="m/s")
         self._lifetime = Quantity("lifetime", self.lifetime, above=0, unit="s", forever=True)
+        if not isinstance(self.attributes, (Mapping, type(None))):
+            raise InvalidInput(f"attributes must be numbers by name, not {shown(self.attributes)}")
         given = {attribute_name(name): value for name, value in (self.attributes or {}).items()}
         self._columns = {
             "m": Quantity("mass", self.mass, above=0, unit="kg"),
@@ -238,10 +240,16 @@ class ShapedEmitter(Emitter):
         start = number("start", self.start, unit="s")
         stop = math.inf if self.stop == math.inf else number("stop", self.stop, above=start, unit="s")
         found: dict[int, Schedule] = {}
+        if not isinstance(self.bursts, (Sequence, np.ndarray)):
+            raise InvalidInput(f"bursts must be pairs of a time [s] and a count, not {shown(self.bursts)}")
         alone = not len(self.bursts) and not self.per_distance
         rate = (100.0 if alone else 0.0) if self.rate is None else self.rate
         if callable(rate) or isinstance(rate, str):
-            found[0] = _curve(rate, start, stop)
+            self._rate = Parameter("rate", rate, unit="1/s", at_least=0, at_most=FASTEST)
+            if not self._rate.common:
+                raise InvalidInput("rate may depend on t and nothing else")
+            self._rate.at(start)
+            found[0] = Curve(self._rate_at, start, stop)
         elif number("rate", rate, at_least=0, at_most=FASTEST, unit="1/s") > 0:
             number("start", start, at_least=-MOST / rate, unit="s")
             found[0] = Steady(float(rate), start, stop)
@@ -252,12 +260,20 @@ class ShapedEmitter(Emitter):
                 raise InvalidInput(
                     "per_distance needs a position that moves: write it as formulas of t, such as ['2*t', 0, 0]"
                 )
-            found[2] = Curve(lambda t: self.per_distance * lengths(self._motion.velocity(t)), start, stop)
+            found[2] = Curve(self._rate_of_the_way, start, stop)
         if not found:
             raise InvalidInput(
                 "rate = 0 is not allowed alone: give a rate greater than 0 [1/s], bursts or per_distance"
             )
         return found
+
+    def _rate_at(self, t: Array) -> Array:
+        """Births per second, shape (k,), for a rate that changes."""
+        return np.broadcast_to(self._rate.at(t)[0], np.shape(t)).astype(np.float64)
+
+    def _rate_of_the_way(self, t: Array) -> Array:
+        """Births per second that births per metre come to, shape (k,)."""
+        return np.broadcast_to(self.per_distance * lengths(self._motion.velocity(t)), np.shape(t))
 
 
 def frames(axis: Array) -> tuple[Array, Array]:
@@ -288,14 +304,6 @@ def _children(rows: NDArray[np.intp], first: Numbers, count: Numbers) -> tuple[N
     """Each row as often as it has children, and their numbers from `first` on."""
     ends = np.cumsum(count)
     return np.repeat(rows, count), np.arange(int(ends[-1]) if len(ends) else 0) + np.repeat(first - ends + count, count)
-
-
-def _curve(rate: Any, start: float, stop: float) -> Schedule:
-    parameter = Parameter("rate", rate, unit="1/s", at_least=0, at_most=FASTEST)
-    if not parameter.common:
-        raise InvalidInput("rate may depend on t and nothing else")
-    parameter.at(start)
-    return Curve(lambda t: np.broadcast_to(parameter.at(t)[0], np.shape(t)).astype(np.float64), start, stop)
 
 
 def _in_order_of_time(parts: Sequence[Birth]) -> Birth:

@@ -203,8 +203,9 @@ class Engine:
         self.died = self.died[:0]
         self._last = span, births, p.id, self.reference.left()
         before = self._room()
-        kernels = [g.members for g in self._grouped(births, span.start) if g.rows is None]
-        if births is None and not look_inside and len(kernels) == 1 and isinstance(kernels[0], SingleMembers):
+        groups = self._grouped(None, span.start) if births is None and not look_inside else []
+        kernels = [g.members for g in groups if g.rows is None]
+        if len(kernels) == 1 and isinstance(kernels[0], SingleMembers):
             kernels[0].before = before  # in one go with the steps
         else:
             self._keep()
