@@ -145,11 +145,13 @@ def test_flakes_are_discs_seen_at_a_slant(normal, wide, high):
 
 
 def test_small_and_blurred_flakes_keep_their_light():
-    def total(radius, z=0.0):
-        flake = Points(name="f", radius=radius, color=(0.6, 0.6, 0.6, 1.0), normals=np.array([[0.0, 0, 1]]))
+    def total(radius, z=0.0, way=0.0):
+        motion, normals = np.array([[way, 0.3 * way, 0]]), np.array([[0.0, 0, 1]])
+        flake = Points(name="f", radius=radius, color=(0.6, 0.6, 0.6, 1.0), normals=normals, motion=motion)
         return shone(np.array([[0, 0, z]]), flake, size=(320, 240))[:, :, 1].sum()
 
     assert total(0.01) / total(0.005) == pytest.approx(4.0, rel=0.05)
+    assert total(0.02, way=0.5) == pytest.approx(total(0.02), rel=0.02)
     assert total(0.02, 8.0) / total(0.02) == pytest.approx(25.0, rel=0.2)  # near the eye it is large, and out of focus
 
 
@@ -168,7 +170,14 @@ def test_sprites_with_nothing_and_with_numbers_that_are_not_finite():
         image(frame(np.zeros((0, 3)), Points(name="p", **more)), camera=FRONT, size=SIZE)
 
 
-@pytest.mark.parametrize("more", [{"normals": np.zeros((2, 3))}, {"glow": True, "motion": np.zeros((4, 3))}])
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"normals": np.zeros((2, 3))},
+        {"soft": True, "motion": np.zeros((2, 3))},
+        {"glow": True, "motion": np.zeros((4, 3))},
+    ],
+)
 def test_arrays_that_do_not_fit_are_named(more):
     with pytest.raises(InvalidInput, match="'p' has 3 items"):
         image(frame(np.zeros((3, 3)), Points(name="p", **more)), camera=FRONT, size=SIZE)
