@@ -123,6 +123,13 @@ def test_glows_light_smoke_by_the_square_of_the_distance():
     np.testing.assert_allclose(lit(places, glows=many, style=dark) - lit(places, style=dark), expected, rtol=0.02)
 
 
+def test_one_puff_far_away_spoils_nothing():
+    random = np.random.default_rng(7)
+    cloud = random.normal(0, 0.5, (3000, 3))
+    alone, joined = lit(cloud, 0.1), lit(np.concatenate([cloud, [[0, 1e9, 0], [1e9, 0, -5]]]), 0.1)[:3000]
+    np.testing.assert_allclose(joined, alone, rtol=0.05)
+
+
 def test_smoke_is_the_same_in_any_order_of_drawing():
     random = np.random.default_rng(5)
     places = random.normal(0, 0.8, (300, 3))
