@@ -162,7 +162,6 @@ def test_a_streak_is_the_way_since_the_shutter_opened_or_the_birth() -> None:
     np.testing.assert_allclose(points.motion, [[0, 1.5, 0]] * 3, rtol=1e-6)
     points = aging(particles="glow", shutter=2.0)
     np.testing.assert_allclose(points.motion, [[0, 3, 0]] * 3, rtol=1e-6)
-    np.testing.assert_allclose(points.color[:, 3], 0.25)  # it has shone for a quarter of the time
 
 
 def test_groups_look_otherwise() -> None:

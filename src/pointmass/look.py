@@ -71,7 +71,7 @@ class Look:
     groups : other looks for some particles, by the name of a group, or of an attribute that is not 0 for them; tables
         of what is said here of particles. Who is in several has the first.
     shutter : exposure time [s]: a glowing particle is a streak as long as the way that it went meanwhile, and as much
-        dimmer; 0 = none. Films have half the time between two frames.
+        dimmer, and a flake is smeared; 0 = none. Films have half the time between two frames.
     springs : whether springs are drawn, as lines of `spring_width` [m] (None = 0.3% of the scene) and `spring_color`
         (None = by family).
     trails : length of the particles' trails [s], 0 = none.
@@ -191,10 +191,7 @@ class Look:
         colors = self._colors(p, v, age, rows)
         motion = normals = None
         if self.shutter > 0:
-            # Who was born while the shutter was open shines for a part of the time only.
-            exposed = np.minimum(age[rows], self.shutter)
-            motion = (v[rows] * exposed[:, None]).astype(np.float32)
-            colors[:, 3] *= exposed / self.shutter
+            motion = (v[rows] * np.minimum(age[rows], self.shutter)[:, None]).astype(np.float32)  # nobody moved unborn
         if self.particles == "flakes":
             size = random.uniform(0, "flakes", p.id[rows], "size")[:, 0]
             radius = (radius * (SMALLEST_FLAKE + (LARGEST_FLAKE - SMALLEST_FLAKE) * size)).astype(np.float32)

@@ -123,6 +123,13 @@ def test_glows_light_smoke_by_the_square_of_the_distance():
     np.testing.assert_allclose(lit(places, glows=many, style=dark) - lit(places, style=dark), expected, rtol=0.02)
 
 
+def test_one_puff_far_away_spoils_nothing():
+    random = np.random.default_rng(7)
+    cloud = random.normal(0, 0.5, (3000, 3))
+    alone, joined = lit(cloud, 0.1), lit(np.concatenate([cloud, [[0, 1e9, 0], [1e9, 0, -5]]]), 0.1)[:3000]
+    np.testing.assert_allclose(joined, alone, rtol=0.05)
+
+
 def test_smoke_is_the_same_in_any_order_of_drawing():
     random = np.random.default_rng(5)
     places = random.normal(0, 0.8, (300, 3))
@@ -145,11 +152,13 @@ def test_flakes_are_discs_seen_at_a_slant(normal, wide, high):
 
 
 def test_small_and_blurred_flakes_keep_their_light():
-    def total(radius, z=0.0):
-        flake = Points(name="f", radius=radius, color=(0.6, 0.6, 0.6, 1.0), normals=np.array([[0.0, 0, 1]]))
+    def total(radius, z=0.0, way=0.0):
+        motion, normals = np.array([[way, 0.3 * way, 0]]), np.array([[0.0, 0, 1]])
+        flake = Points(name="f", radius=radius, color=(0.6, 0.6, 0.6, 1.0), normals=normals, motion=motion)
         return shone(np.array([[0, 0, z]]), flake, size=(320, 240))[:, :, 1].sum()
 
     assert total(0.01) / total(0.005) == pytest.approx(4.0, rel=0.05)
+    assert total(0.02, way=0.5) == pytest.approx(total(0.02), rel=0.02)
     assert total(0.02, 8.0) / total(0.02) == pytest.approx(25.0, rel=0.2)  # near the eye it is large, and out of focus
 
 
@@ -168,7 +177,14 @@ def test_sprites_with_nothing_and_with_numbers_that_are_not_finite():
         image(frame(np.zeros((0, 3)), Points(name="p", **more)), camera=FRONT, size=SIZE)
 
 
-@pytest.mark.parametrize("more", [{"normals": np.zeros((2, 3))}, {"glow": True, "motion": np.zeros((4, 3))}])
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"normals": np.zeros((2, 3))},
+        {"soft": True, "motion": np.zeros((2, 3))},
+        {"glow": True, "motion": np.zeros((4, 3))},
+    ],
+)
 def test_arrays_that_do_not_fit_are_named(more):
     with pytest.raises(InvalidInput, match="'p' has 3 items"):
         image(frame(np.zeros((3, 3)), Points(name="p", **more)), camera=FRONT, size=SIZE)

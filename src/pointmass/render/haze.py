@@ -6,13 +6,13 @@ import numpy as np
 
 from pointmass.render.bands import each
 from pointmass.render.camera import turn
-from pointmass.render.shadow import Shadow, light_axes
+from pointmass.render.shadow import Shadow, bounds, light_axes
 from pointmass.render.tables import F32, F64
 
 LARGEST = 512  # cells along a side of the plane on which puffs leave their shadow
 FINE = 3.0  # radii of a middling puff [cells]
-SCATTERED = 0.35  # share of the light that finds its way round a puff, and is dimmed
-SOFTLY = 0.25  # by so much of the puffs' thickness only
+SCATTERED = 0.3  # share of the light that finds its way through from puff to puff, which ends with
+SOFTLY = 0.15  # one over the thickness (times this), not exponentially: thick smoke is grey, and not black
 OWN = 0.25  # share of a puff's thickness that lies before its own middle
 SIDE = 0.55  # how much brighter a puff is on the side of the light
 MATT = 0.45  # light that shines through a flake, so that it is never black
@@ -82,14 +82,14 @@ def _through(rows: F32, towards: F64) -> F64:
         return np.ones(len(rows))
     places = turn(rows[:, 17:20].astype(np.float64), light_axes(towards))
     radius = rows[:, 20].astype(np.float64)
-    low, high = places[:, :2].min(axis=0), places[:, :2].max(axis=0)
+    low, high = (corner[:2] for corner in bounds(places))
     cell = max(float((high - low).max()) / (LARGEST - 1), float(np.median(radius)) / FINE)
     side = np.ceil((high - low) / cell).astype(np.int64) + 1
     spots = np.column_stack((places[:, :2] - low, radius)) / cell
     order = np.argsort(places[:, 2], kind="stable")
     depth = kernels_haze.gather(order, spots.astype(np.float32), thick.astype(np.float32), int(side[1]), int(side[0]))
     depth = depth.astype(np.float64) + OWN * thick
-    through: F64 = (1.0 - SCATTERED) * np.exp(-depth) + SCATTERED * np.exp(-SOFTLY * depth)
+    through: F64 = (1.0 - SCATTERED) * np.exp(-depth) + SCATTERED / (1.0 + SOFTLY * depth)
     return through
 
 
@@ -113,9 +113,9 @@ def _clusters(glows: F64) -> tuple[F32, float]:
     """Few lights that stand for many, and how wide each is [m]: the middle and the sum of those in a cell."""
     if len(glows) <= CLUSTERS**2:
         return glows.astype(np.float32), 0.0
-    low, high = glows[:, :3].min(axis=0), glows[:, :3].max(axis=0)
+    low, high = bounds(glows[:, :3])
     cell = max(float((high - low).max()) / CLUSTERS, 1e-9)
-    place = np.minimum(((glows[:, :3] - low) / cell).astype(np.int64), CLUSTERS - 1)
+    place = np.clip((glows[:, :3] - low) / cell, 0, CLUSTERS - 1).astype(np.int64)
     index = (place[:, 0] * CLUSTERS + place[:, 1]) * CLUSTERS + place[:, 2]
     strength = glows[:, 3:].sum(axis=1)
     total = np.bincount(index, strength, CLUSTERS**3)

@@ -83,7 +83,7 @@ def shadow(all_casters: list[Casters], light: F64) -> Shadow:
         return no_shadow()
     axes = light_axes(light)
     placed = turn(found, axes)
-    low, high = _bounds(placed)
+    low, high = bounds(placed)
     widest = max((float(c.balls[:, 3].max()) for c in all_casters if len(c.balls)), default=0.0)
     extent = max(float((high - low)[:2].max()) * 1.1 + 2.0 * widest, 1e-9)
     extent = GROWTH ** math.ceil(math.log(extent, GROWTH))
@@ -110,7 +110,7 @@ def shadow(all_casters: list[Casters], light: F64) -> Shadow:
     return Shadow(depth, matrix)
 
 
-def _bounds(placed: F64) -> tuple[F64, F64]:
+def bounds(placed: F64) -> tuple[F64, F64]:
     """Lowest and highest corner of what the map must hold; a runaway of a large cloud does not spread it thin."""
     low, high = placed.min(axis=0), placed.max(axis=0)
     if len(placed) <= MANY:

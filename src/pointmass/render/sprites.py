@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from pointmass.errors import InvalidInput
-from pointmass.frame import Frame, Points
+from pointmass.frame import Floats, Frame, Points
 from pointmass.render.camera import View, turn
 from pointmass.render.tables import F64, Table, bounded, colors, column, corners, named, pixel_box
 
@@ -44,28 +44,35 @@ def sprites(points: Points, frame: Frame, view: View, focus: float) -> Table:
     seen = view.see(places)
     radius = column(points.radius, len(seen), points.name)
     color = colors(points.color, len(seen), points.name)
-    normals = np.zeros_like(seen)
-    if points.normals is not None:
-        normals = np.asarray(points.normals, dtype=np.float64)
-        if normals.shape != seen.shape:
-            raise InvalidInput(f"drawable {points.name!r} has {len(seen)} items, but normals of shape {normals.shape}")
-        normals = turn(bounded(normals), view.axes)
+    normals = _turned("normals", points.normals, points, seen, view)
+    motion = _turned("motions", points.motion, points, seen, view)
     with np.errstate(invalid="ignore"):
         keep = (seen[:, 2] > view.near) & (radius > 0.0) & (color[:, 3] > 0.0)
-        keep &= np.isfinite(seen.sum(axis=1) + radius + color.sum(axis=1) + normals.sum(axis=1))
-    seen, radius, color, normals = seen[keep], radius[keep], color[keep], normals[keep]
+        keep &= np.isfinite(seen.sum(axis=1) + radius + color.sum(axis=1) + normals.sum(axis=1) + motion.sum(axis=1))
+    seen, radius, color, normals, motion = seen[keep], radius[keep], color[keep], normals[keep], motion[keep]
     rows = np.zeros((len(seen), COLUMNS))
     rows[:, 0:2], rows[:, 6], rows[:, 9:12] = view.project(seen), color[:, 3], color[:, :3]
     rows[:, 17:20], rows[:, 20], rows[:, 25] = seen, radius, points.daylight
     if points.normals is None:
         _puffs(rows, view)
     else:
-        _flakes(rows, normals, view, focus)
+        _flakes(rows, normals, motion, view, focus)
     a, b, c = rows[:, 2], rows[:, 3], rows[:, 4]
     reach = np.sqrt(np.stack([c, a], axis=1) / (a * c - b * b)[:, None])
     box = pixel_box(rows[:, 0:2] - reach, rows[:, 0:2] + reach, view.width, view.height)
     no = np.zeros(len(rows), bool)
     return Table(rows.astype(np.float32), box, seen[:, 2], no, no)
+
+
+def _turned(what: str, vectors: Floats | None, points: Points, seen: F64, view: View) -> F64:
+    """Vectors of the items in view coordinates, shape (n, 3); 0 where none are given."""
+    if vectors is None:
+        return np.zeros_like(seen)
+    given = np.asarray(vectors, dtype=np.float64)
+    if given.shape != seen.shape:
+        raise InvalidInput(f"drawable {points.name!r} has {len(seen)} items, but {what} of shape {given.shape}")
+    turned: F64 = turn(bounded(given), view.axes)
+    return turned
 
 
 def _puffs(rows: F64, view: View) -> None:
@@ -82,8 +89,12 @@ def _puffs(rows: F64, view: View) -> None:
     rows[:, 15] = rows[:, 16] = 1.0 / reach  # times the light's direction, once it is known
 
 
-def _flakes(rows: F64, normals: F64, view: View, focus: float) -> None:
-    """Discs seen at a slant, through a lens."""
+def _flakes(rows: F64, normals: F64, motion: F64, view: View, focus: float) -> None:
+    """Discs seen at a slant, through a lens, and smeared along their way.
+
+    The second moments of a disc, of the lens and of the way add up, as those of things that are folded into each other
+    do; an ellipse is drawn that has the same.
+    """
     z, radius = rows[:, 19], rows[:, 20]
     length = np.sqrt((normals * normals).sum(axis=1))
     normals = normals / np.where(length > 0.0, length, 1.0)[:, None]
@@ -96,15 +107,18 @@ def _flakes(rows: F64, normals: F64, view: View, focus: float) -> None:
     narrow = np.where(size[:, None] > 1e-6, narrow / np.maximum(size, 1e-6)[:, None], (1.0, 0.0))
     pixels = view.focal * radius / z
     blur = SHARPEST + 0.5 * view.focal * LENS * np.abs(focus - z) / z
-    across, along = np.sqrt((pixels * slant) ** 2 + blur**2), np.sqrt(pixels**2 + blur**2)
-    rows[:, 6] *= pixels**2 * slant / (across * along)
-    rows[:, 5] = np.maximum(0.6 * across / blur, 1.0)
+    way = view.focal * np.stack([motion[:, 0], -motion[:, 1]], axis=1) / z[:, None]
+    rows[:, 0:2] -= 0.5 * way
+    # Four times the moments [pixels^2]: a disc has the square of its radius, a way a third of that of its length.
+    disc = np.stack([narrow[:, 0] ** 2, narrow[:, 0] * narrow[:, 1], narrow[:, 1] ** 2])
+    xx, xy, yy = (pixels**2) * (np.array([1.0, 0.0, 1.0])[:, None] - (1.0 - slant**2) * disc)
+    xx, xy, yy = xx + blur**2 + way[:, 0] ** 2 / 3, xy + way[:, 0] * way[:, 1] / 3, yy + blur**2 + way[:, 1] ** 2 / 3
+    area = xx * yy - xy * xy
+    rows[:, 6] *= pixels**2 * slant / np.sqrt(area)
+    smeared = blur + 0.5 * np.sqrt((way * way).sum(axis=1))
+    rows[:, 5] = np.maximum(0.6 * pixels * slant / smeared, 1.0)
     # The mean of min(hard u, 1)^3 over the ellipse, which is so much larger than the flake that no light is lost.
-    share = 1.0 - 0.75 / rows[:, 5]
-    wide = share / along**2
-    more = share / across**2 - wide
-    rows[:, 2] = wide + more * narrow[:, 0] ** 2
-    rows[:, 3] = more * narrow[:, 0] * narrow[:, 1]
-    rows[:, 4] = wide + more * narrow[:, 1] ** 2
+    share = (1.0 - 0.75 / rows[:, 5]) / area
+    rows[:, 2], rows[:, 3], rows[:, 4] = share * yy, -share * xy, share * xx
     rows[:, 8] = z * z / radius
     rows[:, 7] = 1.0 / z + GROUNDED / rows[:, 8]
