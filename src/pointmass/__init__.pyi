@@ -76,6 +76,9 @@ from .forces import (
     Attractor as Attractor,
 )
 from .forces import (
+    CurlNoise as CurlNoise,
+)
+from .forces import (
     Drag as Drag,
 )
 from .forces import (
@@ -311,6 +314,9 @@ from .tracing.functions import (
 )
 from .tracing.functions import (
     where as where,
+)
+from .tracing.noise import (
+    noise as noise,
 )
 
 __version__: str

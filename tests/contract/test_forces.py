@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pointmass.collisions import Plane, Sphere
 from pointmass.forces import FORCES, Vortex
 from pointmass.laws.elements import ElementForce
 from pointmass.laws.force import Blocks
@@ -196,6 +197,31 @@ EXAMPLES: dict[str, list[Example]] = {
             lambda i: {"circulation": CIRCULATION[i] * TIME, "eps": 0.0},
             naive.point_vortices,
             pairs=True,
+        ),
+    ],
+    "curl_noise": [
+        Example(
+            {"length": 2.0, "speed": "1 + t", "rate": 0.4, "octaves": 2, "gain": 0.7, "seed": 9},
+            lambda i: {"psi": naive.stream(2.0, 1 + TIME, 0.4, 2, 0.7, 9)},
+            naive.curl,
+        ),
+        Example(
+            {"length": 1.5, "rate": 0.0, "octaves": 1, "around": [Sphere((0.2, 0, 0), 0.5), Plane(("0.1*t", -1, 0))]},
+            lambda i: {
+                "psi": naive.stream(1.5, 1.0, None, 1, 0.5, 0),
+                "solids": [
+                    (
+                        1.5,
+                        lambda x, t: naive.dot(*2 * [naive.sub(x, (0.2, 0, 0))]) ** 0.5 - 0.5,
+                        lambda x, t: naive.scale(
+                            naive.dot(*2 * [naive.sub(x, (0.2, 0, 0))]) ** -0.5, naive.sub(x, (0.2, 0, 0))
+                        ),
+                    ),
+                    (1.5, lambda x, t: x[1] + 1, lambda x, t: (0, 1, 0)),
+                ],
+            },
+            naive.curl,
+            text=False,
         ),
     ],
     "wind": [

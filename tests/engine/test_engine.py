@@ -71,6 +71,7 @@ LAWS: dict[str, list[Callable[[], pm.Force]]] = {
         lambda: pm.Flow(grid=pm.Grid(GRID[0], outside="clamp", **PLACE)),
     ],
     "vortex": [lambda: pm.Vortex(2.0, eps=0.3)],
+    "curl_noise": [lambda: pm.CurlNoise(rate=0, octaves=1)],
     "gravitation": [lambda: pm.Gravitation(0.5, eps=0.4), lambda: pm.Gravitation("1 + t", eps=0.4, on=[1, 2, 6])],
     "lennard_jones": [lambda: pm.LennardJones(0.1, 0.3)],
     "soft_sphere": [lambda: pm.SoftSphere(50.0, 0.3, radius=0.4)],

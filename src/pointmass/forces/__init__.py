@@ -5,6 +5,7 @@ from __future__ import annotations
 from pointmass.errors import unknown
 from pointmass.forces.angles import Angles
 from pointmass.forces.attractor import Attractor
+from pointmass.forces.curl_noise import CurlNoise
 from pointmass.forces.drag import Drag
 from pointmass.forces.field import Field
 from pointmass.forces.flow import Flow
@@ -35,6 +36,7 @@ FORCES: dict[str, type[Force]] = {
     "soft_sphere": SoftSphere,
     "vortex": Vortex,
     "point_vortices": PointVortices,
+    "curl_noise": CurlNoise,
     "wind": Wind,
     "field": Field,
     "flow": Flow,
@@ -45,6 +47,7 @@ __all__ = [
     "FORCES",
     "Angles",
     "Attractor",
+    "CurlNoise",
     "Drag",
     "Field",
     "Flow",
