@@ -355,3 +355,43 @@ def curl(x, v, m, t, psi, solids=()):
     slopes = [[p.imag / step for p in map(complex, around([a + 1j * step * (k == axis) for k, a in enumerate(x)]))]
               for axis in range(3)]  # fmt: skip
     return [slopes[1][2] - slopes[2][1], slopes[2][0] - slopes[0][2], slopes[0][1] - slopes[1][0]]
+
+
+def vortex_line(x, v, m, t, a, b, circulation, eps):
+    """By Gauss and Legendre's rule on many pieces, whose error is far below rounding."""
+    nodes = [0.0, 0.5384693101056831, -0.5384693101056831, 0.906179845938664, -0.906179845938664]
+    weights = [0.5688888888888889, 0.47862867049936647, 0.47862867049936647, 0.23692688505618908, 0.23692688505618908]
+    total, pieces, line = [0.0, 0.0, 0.0], 400, sub(b, a)
+    for k in range(pieces):
+        for u, w in zip(nodes, weights, strict=True):
+            d = sub(sub(x, a), scale((k + 0.5 + u / 2) / pieces, line))
+            factor = w / 2 / pieces * circulation / (4 * math.pi) / (dot(d, d) + eps**2) ** 1.5
+            total = [p + factor * q for p, q in zip(total, cross(line, d), strict=True)]
+    return total
+
+
+def vortex_ring(x, v, m, t, center, axis, radius, circulation, eps):
+    """By the rule of rectangles, which on a circle converges faster than any power."""
+    e = scale(1 / norm(axis), axis)
+    helper = (1.0, 0.0, 0.0) if abs(e[0]) < 0.5 else (0.0, 1.0, 0.0)
+    first = scale(1 / norm(cross(e, helper)), cross(e, helper))
+    second = cross(e, first)
+    total, pieces = [0.0, 0.0, 0.0], 1000
+    for k in range(pieces):
+        c, s = math.cos(2 * math.pi * k / pieces), math.sin(2 * math.pi * k / pieces)
+        place = [p + radius * (c * q + s * r) for p, q, r in zip(center, first, second, strict=True)]
+        ds = [2 * math.pi * radius / pieces * (c * r - s * q) for q, r in zip(first, second, strict=True)]
+        d = sub(x, place)
+        factor = circulation / (4 * math.pi) / (dot(d, d) + eps**2) ** 1.5
+        total = [p + factor * q for p, q in zip(total, cross(ds, d), strict=True)]
+    return total
+
+
+def gust(x, t, velocity, intensity, length, lifetime, seed):
+    place = [(a - t * u) / length for a, u in zip(x, velocity, strict=True)]
+    size = intensity * norm(velocity)
+    return [u + size * noise(place, t / lifetime, seed, c) for c, u in enumerate(velocity)]
+
+
+def buoyancy(x, v, m, t, temperature, ambient, beta, density, alpha, up):
+    return scale(m * (beta * (temperature - ambient) - alpha * density) / norm(up), up)

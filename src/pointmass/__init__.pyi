@@ -76,6 +76,9 @@ from .forces import (
     Attractor as Attractor,
 )
 from .forces import (
+    Buoyancy as Buoyancy,
+)
+from .forces import (
     CurlNoise as CurlNoise,
 )
 from .forces import (
@@ -95,6 +98,9 @@ from .forces import (
 )
 from .forces import (
     Gravity as Gravity,
+)
+from .forces import (
+    Gust as Gust,
 )
 from .forces import (
     Harmonic as Harmonic,
@@ -119,6 +125,12 @@ from .forces import (
 )
 from .forces import (
     Vortex as Vortex,
+)
+from .forces import (
+    VortexLine as VortexLine,
+)
+from .forces import (
+    VortexRing as VortexRing,
 )
 from .forces import (
     Wind as Wind,

@@ -199,6 +199,43 @@ EXAMPLES: dict[str, list[Example]] = {
             pairs=True,
         ),
     ],
+    "vortex_line": [
+        Example(
+            {"a": ("t", -0.5, 0), "b": (1, 1, 0.5), "circulation": 2.0, "eps": 0.3},
+            lambda i: {"a": (TIME, -0.5, 0), "b": (1, 1, 0.5), "circulation": 2.0, "eps": 0.3},
+            naive.vortex_line,
+        )
+    ],
+    "vortex_ring": [
+        Example(
+            {"center": (0, "t", 0), "axis": (1, 2, 0), "radius": 0.8, "circulation": 2.0, "eps": 0.3},
+            lambda i: {"center": (0, TIME, 0), "axis": (1, 2, 0), "radius": 0.8, "circulation": 2.0, "eps": 0.3},
+            naive.vortex_ring,
+        )
+    ],
+    "gust": [
+        Example(
+            {"velocity": (3, 0.5, -1), "intensity": "0.2 + t", "length": 2.0, "lifetime": 0.8, "seed": 4},
+            lambda i: {
+                "function": lambda x, v, m, t: naive.gust(x, t, (3, 0.5, -1), 0.2 + TIME, 2.0, 0.8, 4),
+            },
+            naive.formula,
+        )
+    ],
+    "buoyancy": [
+        Example(
+            {"temperature": "300 + 100*charge", "ambient": 290.0, "density": 0.1, "up": (0, 2, 1)},
+            lambda i: {
+                "temperature": 300 + 100 * CHARGE[i],
+                "ambient": 290.0,
+                "beta": 9.81 / 293,
+                "density": 0.1,
+                "alpha": 9.81 / 1.2,
+                "up": (0, 2, 1),
+            },
+            naive.buoyancy,
+        )
+    ],
     "curl_noise": [
         Example(
             {"length": 2.0, "speed": "1 + t", "rate": 0.4, "octaves": 2, "gain": 0.7, "seed": 9},

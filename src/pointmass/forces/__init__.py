@@ -5,6 +5,7 @@ from __future__ import annotations
 from pointmass.errors import unknown
 from pointmass.forces.angles import Angles
 from pointmass.forces.attractor import Attractor
+from pointmass.forces.buoyancy import Buoyancy
 from pointmass.forces.curl_noise import CurlNoise
 from pointmass.forces.drag import Drag
 from pointmass.forces.field import Field
@@ -12,6 +13,7 @@ from pointmass.forces.flow import Flow
 from pointmass.forces.gravitation import Gravitation
 from pointmass.forces.gravity import Gravity
 from pointmass.forces.grid_files import load_grid
+from pointmass.forces.gust import Gust
 from pointmass.forces.harmonic import Harmonic
 from pointmass.forces.lennard_jones import LennardJones
 from pointmass.forces.magnetic import Magnetic
@@ -20,6 +22,8 @@ from pointmass.forces.quadratic_drag import QuadraticDrag
 from pointmass.forces.soft_sphere import SoftSphere
 from pointmass.forces.springs import Springs
 from pointmass.forces.vortex import Vortex
+from pointmass.forces.vortex_line import VortexLine
+from pointmass.forces.vortex_ring import VortexRing
 from pointmass.forces.wind import Wind
 from pointmass.laws.force import Force
 
@@ -35,11 +39,15 @@ FORCES: dict[str, type[Force]] = {
     "lennard_jones": LennardJones,
     "soft_sphere": SoftSphere,
     "vortex": Vortex,
+    "vortex_line": VortexLine,
+    "vortex_ring": VortexRing,
     "point_vortices": PointVortices,
     "curl_noise": CurlNoise,
+    "gust": Gust,
     "wind": Wind,
     "field": Field,
     "flow": Flow,
+    "buoyancy": Buoyancy,
     "magnetic": Magnetic,
 }
 
@@ -47,6 +55,7 @@ __all__ = [
     "FORCES",
     "Angles",
     "Attractor",
+    "Buoyancy",
     "CurlNoise",
     "Drag",
     "Field",
@@ -54,6 +63,7 @@ __all__ = [
     "Force",
     "Gravitation",
     "Gravity",
+    "Gust",
     "Harmonic",
     "LennardJones",
     "Magnetic",
@@ -62,6 +72,8 @@ __all__ = [
     "SoftSphere",
     "Springs",
     "Vortex",
+    "VortexLine",
+    "VortexRing",
     "Wind",
     "find_force",
     "load_grid",
