@@ -395,3 +395,33 @@ def gust(x, t, velocity, intensity, length, lifetime, seed):
 
 def buoyancy(x, v, m, t, temperature, ambient, beta, density, alpha, up):
     return scale(m * (beta * (temperature - ambient) - alpha * density) / norm(up), up)
+
+
+def draw(key, index, seed, component):
+    """A random number of mean 0 and variance 1."""
+    base = hashed((seed + 0x165667B1) % 2**32)
+    who = hashed((round(key * 2**24) * 0x9E3779B1 + base) % 2**32) + base
+    bits = hashed((who + index % 2**24 * 0x27D4EB2F + 0x165667B1 * (component + 1)) % 2**32)
+    return (sum((bits >> 10 * k) % 1024 for k in range(3)) - 1534.5) / math.sqrt((1024**2 - 1) / 4)
+
+
+def flutter(t, chance, strength, lifetime, seed):
+    """Kicks of a cell each, the oldest first; `shorter` and `mean` follow from a cell of 1/4."""
+    h, cells = 0.25, 24
+    kick = math.sqrt(1 - math.exp(-2 * h))
+
+    def variance(s):
+        return math.exp(-2 * h * s) + (kick * (1 - math.exp(-h * s)) / (1 - math.exp(-h))) ** 2
+
+    simpson = [1, *(4, 2) * 499, 4, 1]
+    mean = sum(w * variance(k / 1000) for k, w in enumerate(simpson)) / 3000
+    now = t / (2 * mean * math.tanh(h / 2) * lifetime) + chance
+    cell = math.floor(now)
+    u = [0.0, 0.0, 0.0]
+    for k in range(cell - cells, cell):
+        oldest = 1 - (now - cell) if k == cell - cells else 1.0
+        u = [math.exp(-h) * a + oldest * kick * draw(chance, k, seed, axis) for axis, a in enumerate(u)]
+    part = math.exp(-h * (now - cell))
+    last = [kick * draw(chance, cell, seed, axis) for axis in range(3)]
+    u = [part * a + (1 - part) / (1 - math.exp(-h)) * b for a, b in zip(u, last, strict=True)]
+    return [s * a / math.sqrt(mean) for s, a in zip(strength, u, strict=True)]

@@ -82,6 +82,9 @@ from .forces import (
     CurlNoise as CurlNoise,
 )
 from .forces import (
+    Diffusion as Diffusion,
+)
+from .forces import (
     Drag as Drag,
 )
 from .forces import (
@@ -89,6 +92,9 @@ from .forces import (
 )
 from .forces import (
     Flow as Flow,
+)
+from .forces import (
+    Flutter as Flutter,
 )
 from .forces import (
     Force as Force,

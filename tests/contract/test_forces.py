@@ -32,6 +32,7 @@ JOINTS = [(0, 1, 2), (3, 2, 5)]
 RNG = np.random.default_rng(42)
 CELLS = RNG.standard_normal((2, 3, 4, 1, 3))
 CELL_PLACE = {"origin": (-2.0, -3.0, 0.0), "spacing": 1.7, "times": (0.0, 1.0)}
+CHANCE = [naive.hashed(i ^ naive.hashed(0)) // 256 / 2**24 for i in range(N)]
 CHARGE, CIRCULATION = RNG.uniform(-1, 1, N), RNG.uniform(-2, 2, N)
 
 
@@ -218,6 +219,26 @@ EXAMPLES: dict[str, list[Example]] = {
             {"velocity": (3, 0.5, -1), "intensity": "0.2 + t", "length": 2.0, "lifetime": 0.8, "seed": 4},
             lambda i: {
                 "function": lambda x, v, m, t: naive.gust(x, t, (3, 0.5, -1), 0.2 + TIME, 2.0, 0.8, 4),
+            },
+            naive.formula,
+        )
+    ],
+    "flutter": [
+        Example(
+            {"strength": (0.5, "t", 2), "lifetime": 0.3, "seed": 5},
+            lambda i: {
+                "function": lambda x, v, m, t: naive.flutter(t, CHANCE[i], (0.5, TIME, 2), 0.3, 5),
+            },
+            naive.formula,
+        )
+    ],
+    "diffusion": [
+        Example(
+            {"coefficient": "0.2 + t", "interval": 0.1, "seed": 6},
+            lambda i: {
+                "function": lambda x, v, m, t: [
+                    math.sqrt(2 * (0.2 + t) / 0.1) * naive.draw(CHANCE[i], 7, 6, axis) for axis in range(3)
+                ],
             },
             naive.formula,
         )

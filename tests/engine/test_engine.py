@@ -74,6 +74,8 @@ LAWS: dict[str, list[Callable[[], pm.Force]]] = {
     "vortex_line": [lambda: pm.VortexLine((0, -1, 0), (0, 1, 0.2), eps=0.2)],
     "vortex_ring": [lambda: pm.VortexRing(eps=0.2)],
     "gust": [pm.Gust],
+    "flutter": [pm.Flutter],
+    "diffusion": [pm.Diffusion],
     "buoyancy": [lambda: pm.Buoyancy("300*charge")],
     "curl_noise": [lambda: pm.CurlNoise(rate=0, octaves=1)],
     "gravitation": [lambda: pm.Gravitation(0.5, eps=0.4), lambda: pm.Gravitation("1 + t", eps=0.4, on=[1, 2, 6])],

@@ -20,7 +20,7 @@ from pointmass.laws.grid import Grid, GridLookup
 from pointmass.laws.parameter import Component, Parameter
 from pointmass.particles import Particles
 from pointmass.tracing.columns import expanded
-from pointmass.tracing.noise import Noise
+from pointmass.tracing.noise import Function
 from pointmass.tracing.program import Primitive, Program
 from pointmass.tracing.trace import Traced, vector_names
 
@@ -201,8 +201,8 @@ class Binder:
         def call(primitive: Primitive, parts: list[str]) -> tuple[str, int | None]:
             if isinstance(primitive, GridLookup):
                 return self._look_up(primitive, parts), None
-            assert isinstance(primitive, Noise)
-            together = tuple(p for p in found if isinstance(p, Noise) and len(p.orders) == len(primitive.orders))
+            assert isinstance(primitive, Function)
+            together = tuple(p for p in found if isinstance(p, Function) and p.family == primitive.family)
             name = self._function((dtype, together), lambda name: noise_text.function_of(together, name, dtype))
             return f"{name}({', '.join(parts)})", together.index(primitive)
 

@@ -1,4 +1,4 @@
-"""Prints noise for one place, from the program that the reference path runs on columns."""
+"""Prints noise and draws for one place, from the program that the reference path runs on columns."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 from pointmass.engine.printing import function, statements
 from pointmass.tracing.columns import expanded
-from pointmass.tracing.noise import Noise, traced_noise
+from pointmass.tracing.noise import Function
 
 
-def function_of(primitives: Sequence[Noise], name: str, dtype: str) -> str:
-    """The function `name` of a place and a seed that returns some components and derivatives as a tuple."""
-    traced = traced_noise(tuple(primitives))
+def function_of(primitives: Sequence[Function], name: str, dtype: str) -> str:
+    """The function `name` that returns several members of a family as a tuple."""
+    traced = primitives[0].together(tuple(primitives))
     names = {n: n for n in traced.inputs}
     lines, outputs = statements(expanded(traced.program), names, "r", dtype)
     body = [*lines, f"return {', '.join(outputs)},"]

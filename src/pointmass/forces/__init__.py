@@ -7,9 +7,11 @@ from pointmass.forces.angles import Angles
 from pointmass.forces.attractor import Attractor
 from pointmass.forces.buoyancy import Buoyancy
 from pointmass.forces.curl_noise import CurlNoise
+from pointmass.forces.diffusion import Diffusion
 from pointmass.forces.drag import Drag
 from pointmass.forces.field import Field
 from pointmass.forces.flow import Flow
+from pointmass.forces.flutter import Flutter
 from pointmass.forces.gravitation import Gravitation
 from pointmass.forces.gravity import Gravity
 from pointmass.forces.grid_files import load_grid
@@ -44,6 +46,8 @@ FORCES: dict[str, type[Force]] = {
     "point_vortices": PointVortices,
     "curl_noise": CurlNoise,
     "gust": Gust,
+    "flutter": Flutter,
+    "diffusion": Diffusion,
     "wind": Wind,
     "field": Field,
     "flow": Flow,
@@ -57,9 +61,11 @@ __all__ = [
     "Attractor",
     "Buoyancy",
     "CurlNoise",
+    "Diffusion",
     "Drag",
     "Field",
     "Flow",
+    "Flutter",
     "Force",
     "Gravitation",
     "Gravity",

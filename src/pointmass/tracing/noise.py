@@ -6,7 +6,7 @@ vector lanes compute side by side. The field is C2, and its derivatives of any o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from functools import cache, reduce
 from itertools import product
 from math import sqrt
@@ -69,8 +69,21 @@ def noise(
 
 def single(places: Sequence[Number], seed: Number, component: int = 0) -> Number:
     """One octave at x, y, z and perhaps t; components are independent fields that share the work."""
-    primitive = noise_of(component, (0,) * len(places))
-    arguments = [*places, floor(seed)]
+    return _call(noise_of(component, (0,) * len(places)), [*places, floor(seed)])
+
+
+def draw(key: Number, index: Number, seed: Number, component: int = 0) -> Number:
+    """A random number of mean 0 and variance 1, nearly normal (a sum of three), for whole numbers `index` and `seed`.
+
+    Parameters
+    ----------
+    key : in [0, 1), such as the particle attribute `chance`: who draws.
+    """
+    return _call(draw_of(component), [key, floor(index), floor(seed)])
+
+
+def _call(primitive: Primitive, arguments: Sequence[Number]) -> Number:
+    """A primitive as a node of a program where an argument is a symbol, else its value."""
     for argument in arguments:
         if isinstance(argument, Symbol):
             nodes = [argument.lift(a) for a in arguments]
@@ -78,7 +91,26 @@ def single(places: Sequence[Number], seed: Number, component: int = 0) -> Number
     return primitive.columns(*arguments)
 
 
-class Noise(Primitive):
+class Function(Primitive):
+    """An operation with a program of its own, which kernels call as a function.
+
+    Several of a family that have the same arguments are computed together.
+    """
+
+    @property
+    def family(self) -> Hashable:
+        """What those have in common that may be computed together."""
+        raise NotImplementedError
+
+    def together(self, members: tuple[Any, ...]) -> Traced:
+        """The program of several members of the family, with an output for each."""
+        raise NotImplementedError
+
+    def columns(self, *arguments: Any) -> Any:
+        return self.together((self,)).columns(*arguments)[0]
+
+
+class Noise(Function):
     """One component of the noise at (x, y, z, seed) or (x, y, z, t, seed), or a derivative of it.
 
     Parameters
@@ -91,8 +123,12 @@ class Noise(Primitive):
         self.component = component
         self.orders = orders
 
-    def columns(self, *arguments: Any) -> Any:
-        return traced_noise((self,)).columns(*arguments)[0]
+    @property
+    def family(self) -> Hashable:
+        return "noise", len(self.orders)
+
+    def together(self, members: tuple[Noise, ...]) -> Traced:
+        return _traced_noise(members)
 
     def inlined(self, *arguments: Symbol) -> Number:
         return _values((self,), arguments[:3], arguments[3:-1], arguments[-1])[0]
@@ -108,12 +144,44 @@ def noise_of(component: int, orders: tuple[int, ...]) -> Noise:
     return Noise(component, orders)
 
 
+class Draw(Function):
+    """A random number at (key, index, seed).
+
+    Parameters
+    ----------
+    component : which of independent numbers.
+    """
+
+    family = "draw"
+
+    def __init__(self, component: int) -> None:
+        self.component = component
+
+    def together(self, members: tuple[Draw, ...]) -> Traced:
+        return _traced_draws(members)
+
+    def inlined(self, *arguments: Symbol) -> Number:
+        return _draws((self,), *arguments)[0]
+
+
 @cache
-def traced_noise(primitives: tuple[Noise, ...]) -> Traced:
+def draw_of(component: int) -> Draw:
+    """The primitive, the same whenever it is asked for."""
+    return Draw(component)
+
+
+@cache
+def _traced_noise(primitives: tuple[Noise, ...]) -> Traced:
     """Several components and derivatives as one program; all with time, or all without."""
     names = "xyzt"[: len(primitives[0].orders)]
     arguments = dict.fromkeys([*names, "seed"], "scalar")
     return trace(lambda *a: _values(primitives, a[:3], a[3:-1], a[-1]), arguments, len(primitives), "noise")
+
+
+@cache
+def _traced_draws(members: tuple[Draw, ...]) -> Traced:
+    arguments = dict.fromkeys(("key", "index", "seed"), "scalar")
+    return trace(lambda *a: _draws(members, *a), arguments, len(members), "draw")
 
 
 def mean_square(orders: Sequence[int], timed: bool) -> float:
@@ -197,6 +265,18 @@ def _values(primitives: Sequence[Noise], place: Any, time: Any, seed: Symbol) ->
         if key not in found:
             found[key] = {c: _gradient(h, *key, time, place[0]) for c, h in hashes.items()}
     return [_faded(found[p.component, p.orders[3] if time else 0], cells, p.orders, bool(time)) for p in primitives]
+
+
+def _draws(members: Sequence[Draw], key: Symbol, index: Symbol, seed: Symbol) -> list[Number]:
+    base = MIXED(_plus(PRIME_OF_COMPONENT)(_cell(seed)[0]))
+    who = MIXED(SUM(_times(PRIMES[0])(_cell(PERIOD * key)[0]), base))
+    when = SUM(SUM(who, base), _times(PRIME_OF_TIME)(_cell(index)[0]))
+    result = []
+    for member in members:
+        h = MIXED(_plus(PRIME_OF_COMPONENT * (member.component + 1) % 2**32)(when))
+        a, b, c = (_number(BITS * k, BITS)(h, key) for k in range(3))
+        result.append(((a + b + c) - 1.5 * (LEVELS - 1)) * (1.0 / sqrt((LEVELS**2 - 1) / 4)))
+    return result
 
 
 def _cell(a: Symbol) -> Cell:
