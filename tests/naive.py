@@ -5,6 +5,7 @@ They share nothing with the package. A law takes numbers; the loops below call i
 
 from __future__ import annotations
 
+import itertools
 import math
 
 
@@ -256,3 +257,171 @@ def interpolated(values, origin, spacing, times, outside, x, t):
                     for axis in range(3):
                         result[axis] += ws * wi * wj * wk * values[s][i][j][k][axis]
     return result
+
+
+def hashed(h):
+    """lowbias32, on a whole number of 32 bits."""
+    for shift, factor in ((16, 0x21F0AAAD), (15, 0x735A2D97), (15, 1)):
+        h = ((h ^ (h >> shift)) * factor) % 2**32
+    return h
+
+
+def noise(place, t=None, seed=0, component=0):
+    """Gradient noise, corner by corner."""
+
+    def fade(u):
+        return u * u * u * (u * (u * 6 - 15) + 10)
+
+    prime, base = 0x165667B1, hashed((seed + 0x165667B1) % 2**32)
+    whole = [math.floor(complex(a).real) for a in place]  # complex for its slopes
+    total = 0.0
+    for corner in itertools.product((0, 1), repeat=3):
+        point = [(w + c) % 2**24 for w, c in zip(whole, corner, strict=True)]
+        h = (
+            hashed(
+                sum(i * p for i, p in zip([*point, base], (0x9E3779B1, 0x85EBCA77, 0xC2B2AE3D, 1), strict=True)) % 2**32
+            )
+            + base
+        )
+        own = h + prime * (component + 1)
+
+        def gradient(k, own=own):
+            bits = hashed((own + k * 0x27D4EB2F) % 2**32)
+            return [((bits >> 10 * axis) % 1024) - 511.5 for axis in range(3)]
+
+        g = gradient(0)
+        if t is not None:
+            now = t + (h >> 8) % 2**24 / 2**24
+            k, s = math.floor(now) % 2**24, fade(now - math.floor(now))
+            g = [a + s * (b - a) for a, b in zip(gradient(k), gradient((k + 1) % 2**24), strict=True)]
+        away = [a - w - c for a, w, c in zip(place, whole, corner, strict=True)]
+        weight = math.prod(fade(1 + d if c else 1 - d) for c, d in zip(corner, away, strict=True))
+        total += weight * dot(g, away)
+    square = (1024**2 - 1) / 12 * 3 * 535 / 9009 * (181 / 231) ** (2 if t is None else 3)
+    return total / math.sqrt(square)
+
+
+def stream(size, speed, rate, octaves, gain, seed):
+    """The stream function of curl noise, for a root mean square speed far from solids."""
+    slope = slope_square(rate is not None)
+    scale = speed * size / math.sqrt(6 * slope * sum(gain ** (2 * k) for k in range(octaves)))
+
+    def psi(x, t):
+        total = [0.0, 0.0, 0.0]
+        for k in range(octaves):
+            place = [2**k * a / size + k * o for a, o in zip(x, (0.37, 0.71, 0.23), strict=True)]
+            for c in range(3):
+                total[c] += (gain / 2) ** k * noise(place, None if rate is None else rate * t, seed + 65536 * k, c)
+        return [scale * a for a in total]
+
+    return psi
+
+
+def slope_square(timed):
+    """Mean square of d(noise)/dx, by adding up the squares of the polynomials at the middles of 10^4 pieces."""
+
+    def mean(function):
+        return sum(function((k + 0.5) / 10_000) for k in range(10_000)) / 10_000
+
+    def s(u):
+        return u**3 * (6 * u * u - 15 * u + 10)
+
+    def ds(u):
+        return 30 * (u * (1 - u)) ** 2
+
+    near = [2 * mean(lambda u: s(u) ** 2), 2 * mean(lambda u: (s(u) * (1 - u)) ** 2)]
+    steep = [2 * mean(lambda u: ds(u) ** 2), 2 * mean(lambda u: (s(u) - ds(u) * (1 - u)) ** 2)]
+    return (steep[1] * near[0] ** 2 + 2 * steep[0] * near[0] * near[1]) / (3 * near[0] ** 2 * near[1])
+
+
+def curl(x, v, m, t, psi, solids=()):
+    """Curl of a stream function, by complex steps; `solids` are (reach, distance, normal)."""
+
+    def around(x):
+        free = psi(x, t)
+        ramps = []
+        for reach, distance, _ in solids:
+            r = distance(x, t) / reach
+            r = r if abs(complex(r).real) < 1 else math.copysign(1, complex(r).real)
+            ramps.append(15 * r / 8 - 10 * r**3 / 8 + 3 * r**5 / 8)
+        result = scale(math.prod(ramps), free)
+        for k, (_, _, normal) in enumerate(solids):
+            n = normal(x, t)
+            others = math.prod(a for j, a in enumerate(ramps) if j != k)
+            result = [a + others * (1 - ramps[k]) * dot(n, free) * b for a, b in zip(result, n, strict=True)]
+        return result
+
+    step = 1e-30
+    slopes = [[p.imag / step for p in map(complex, around([a + 1j * step * (k == axis) for k, a in enumerate(x)]))]
+              for axis in range(3)]  # fmt: skip
+    return [slopes[1][2] - slopes[2][1], slopes[2][0] - slopes[0][2], slopes[0][1] - slopes[1][0]]
+
+
+def vortex_line(x, v, m, t, a, b, circulation, eps):
+    """By Gauss and Legendre's rule on many pieces, whose error is far below rounding."""
+    nodes = [0.0, 0.5384693101056831, -0.5384693101056831, 0.906179845938664, -0.906179845938664]
+    weights = [0.5688888888888889, 0.47862867049936647, 0.47862867049936647, 0.23692688505618908, 0.23692688505618908]
+    total, pieces, line = [0.0, 0.0, 0.0], 400, sub(b, a)
+    for k in range(pieces):
+        for u, w in zip(nodes, weights, strict=True):
+            d = sub(sub(x, a), scale((k + 0.5 + u / 2) / pieces, line))
+            factor = w / 2 / pieces * circulation / (4 * math.pi) / (dot(d, d) + eps**2) ** 1.5
+            total = [p + factor * q for p, q in zip(total, cross(line, d), strict=True)]
+    return total
+
+
+def vortex_ring(x, v, m, t, center, axis, radius, circulation, eps):
+    """By the rule of rectangles, which on a circle converges faster than any power."""
+    e = scale(1 / norm(axis), axis)
+    helper = (1.0, 0.0, 0.0) if abs(e[0]) < 0.5 else (0.0, 1.0, 0.0)
+    first = scale(1 / norm(cross(e, helper)), cross(e, helper))
+    second = cross(e, first)
+    total, pieces = [0.0, 0.0, 0.0], 1000
+    for k in range(pieces):
+        c, s = math.cos(2 * math.pi * k / pieces), math.sin(2 * math.pi * k / pieces)
+        place = [p + radius * (c * q + s * r) for p, q, r in zip(center, first, second, strict=True)]
+        ds = [2 * math.pi * radius / pieces * (c * r - s * q) for q, r in zip(first, second, strict=True)]
+        d = sub(x, place)
+        factor = circulation / (4 * math.pi) / (dot(d, d) + eps**2) ** 1.5
+        total = [p + factor * q for p, q in zip(total, cross(ds, d), strict=True)]
+    return total
+
+
+def gust(x, t, velocity, intensity, length, lifetime, seed):
+    place = [(a - t * u) / length for a, u in zip(x, velocity, strict=True)]
+    size = intensity * norm(velocity)
+    return [u + size * noise(place, t / lifetime, seed, c) for c, u in enumerate(velocity)]
+
+
+def buoyancy(x, v, m, t, temperature, ambient, beta, density, alpha, up):
+    return scale(m * (beta * (temperature - ambient) - alpha * density) / norm(up), up)
+
+
+def draw(key, index, seed, component):
+    """A random number of mean 0 and variance 1."""
+    base = hashed((seed + 0x165667B1) % 2**32)
+    who = hashed((round(key * 2**24) * 0x9E3779B1 + base) % 2**32) + base
+    bits = hashed((who + index % 2**24 * 0x27D4EB2F + 0x165667B1 * (component + 1)) % 2**32)
+    return (sum((bits >> 10 * k) % 1024 for k in range(3)) - 1534.5) / math.sqrt((1024**2 - 1) / 4)
+
+
+def flutter(t, chance, strength, lifetime, seed):
+    """Kicks of a cell each, the oldest first; `shorter` and `mean` follow from a cell of 1/4."""
+    h, cells = 0.25, 24
+    kick = math.sqrt(1 - math.exp(-2 * h))
+
+    def variance(s):
+        return math.exp(-2 * h * s) + (kick * (1 - math.exp(-h * s)) / (1 - math.exp(-h))) ** 2
+
+    simpson = [1, *(4, 2) * 499, 4, 1]
+    mean = sum(w * variance(k / 1000) for k, w in enumerate(simpson)) / 3000
+    now = t / (2 * mean * math.tanh(h / 2) * lifetime) + chance
+    cell = math.floor(now)
+    u = [0.0, 0.0, 0.0]
+    for k in range(cell - cells, cell):
+        oldest = 1 - (now - cell) if k == cell - cells else 1.0
+        u = [math.exp(-h) * a + oldest * kick * draw(chance, k, seed, axis) for axis, a in enumerate(u)]
+    part = math.exp(-h * (now - cell))
+    last = [kick * draw(chance, cell, seed, axis) for axis in range(3)]
+    u = [part * a + (1 - part) / (1 - math.exp(-h)) * b for a, b in zip(u, last, strict=True)]
+    return [s * a / math.sqrt(mean) for s, a in zip(strength, u, strict=True)]

@@ -19,7 +19,7 @@ def test_columns():
     np.testing.assert_array_equal(p.w, [1, 0.5, 0.25, 0.125])
     np.testing.assert_array_equal(p.column("heat"), [1, 2, 3, 4])
     np.testing.assert_array_equal(p.column("radius"), [0.1] * 4)
-    assert p.columns == ["m", "radius", "age", "lifetime", "charge", "heat"]
+    assert p.columns == ["m", "radius", "age", "lifetime", "chance", "charge", "heat"]
     assert p.id.tolist() == [0, 1, 2, 3]
     assert (p.f == 0).all()
     assert "4, 0 pinned, float64" in repr(p)

@@ -64,7 +64,12 @@ def scene_with(what: str, table: dict[str, Any]) -> dict[str, Any]:
         "name": "test",
         "dt": 1 / 120,
         "bodies": [
-            {"type": "points", "name": "some", "x": points, "attributes": {"charge": 1.0, "circulation": 0.5}},
+            {
+                "type": "points",
+                "name": "some",
+                "x": points,
+                "attributes": {"charge": 1.0, "circulation": 0.5, "temperature": 300.0},
+            },
             {"type": "points", "name": "others", "x": [[2.0, 0.5, 0.0]], "m": [2.0]},
         ],
     }

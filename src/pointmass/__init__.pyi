@@ -103,6 +103,15 @@ from .forces import (
     Attractor as Attractor,
 )
 from .forces import (
+    Buoyancy as Buoyancy,
+)
+from .forces import (
+    CurlNoise as CurlNoise,
+)
+from .forces import (
+    Diffusion as Diffusion,
+)
+from .forces import (
     Drag as Drag,
 )
 from .forces import (
@@ -112,6 +121,9 @@ from .forces import (
     Flow as Flow,
 )
 from .forces import (
+    Flutter as Flutter,
+)
+from .forces import (
     Force as Force,
 )
 from .forces import (
@@ -119,6 +131,9 @@ from .forces import (
 )
 from .forces import (
     Gravity as Gravity,
+)
+from .forces import (
+    Gust as Gust,
 )
 from .forces import (
     Harmonic as Harmonic,
@@ -143,6 +158,12 @@ from .forces import (
 )
 from .forces import (
     Vortex as Vortex,
+)
+from .forces import (
+    VortexLine as VortexLine,
+)
+from .forces import (
+    VortexRing as VortexRing,
 )
 from .forces import (
     Wind as Wind,
@@ -338,6 +359,9 @@ from .tracing.functions import (
 )
 from .tracing.functions import (
     where as where,
+)
+from .tracing.noise import (
+    noise as noise,
 )
 from .zones import (
     ZONES as ZONES,

@@ -10,13 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from pointmass.errors import InvalidInput, finite_array, floats, shown, unknown
+from pointmass.tracing.noise import mixed
 
 Array = NDArray[np.floating[Any]]
 Selection = str | slice | ArrayLike | None  # a group's name, a mask, rows; None = all
 FIRST_FOREIGN_ID = 2**40  # ids from here on are made by emitters, and leave no mark on the count
 NOT_ATTRIBUTES = ("t", "y", "z", "vx", "vy", "vz", "e", "pi", "dtype", "self")  # these mean something else
-FIELDS = ("x", "v", "f", "m", "w", "age", "lifetime", "radius", "id", "pinned")
+FIELDS = ("x", "v", "f", "m", "w", "age", "lifetime", "radius", "chance", "id", "pinned")
 PLAIN = ("m", "radius", "age", "lifetime")  # columns of one number that all particles have
+BUILT_IN = (*PLAIN, "chance")  # and the one that follows from their ids
 
 
 class Column:
@@ -105,6 +107,7 @@ class Particles:
     age : [s], shape (n,).
     lifetime : age at which a particle dies [s], shape (n,); inf = never. Forces may ask for ``age / lifetime``. A
         simulation notes it when the run starts, and when an emitter gives birth.
+    chance : a random number in [0, 1) of each particle, by its id, shape (n,); it is only read.
     id : shape (n,), int64; never used again once a particle is gone.
     version : counts changes of the structure (add, remove, pin, groups), so that what is derived from it can be kept.
 
@@ -142,6 +145,7 @@ class Particles:
         self.groups: dict[str, NDArray[np.bool_]] = {}
         self.version = 0
         self._next_id = 0
+        self._chance = -1, np.zeros(0)
         self._arrays = {name: np.zeros((0, 3), self.dtype) for name in "xvf"}
         self._arrays |= {name: np.zeros(0, self.dtype) for name in PLAIN}
         self._held = np.zeros(0, bool)
@@ -165,6 +169,14 @@ class Particles:
         w: Array = 1 / self.m
         w[self._held] = 0
         return _read_only(w)
+
+    @property
+    def chance(self) -> Array:
+        if self._chance[0] != self.version:
+            low, high = self.id.astype(np.uint64), self.id.astype(np.uint64) >> np.uint64(32)
+            bits = mixed(low ^ mixed(high)) >> np.uint64(8)
+            self._chance = self.version, _read_only((bits * 2.0**-24).astype(self.dtype))
+        return self._chance[1]
 
     def add(
         self,
@@ -296,8 +308,8 @@ class Particles:
         return rows[which].reshape(ids.shape)
 
     def column(self, name: str) -> Array:
-        """A column of numbers by name: m, radius, age, lifetime or a further attribute, shape (n,)."""
-        if name in PLAIN:
+        """A column of numbers by name: m, radius, age, lifetime, chance or a further attribute, shape (n,)."""
+        if name in BUILT_IN:
             return getattr(self, name)  # type: ignore[no-any-return]
         if name not in self.attributes:
             raise unknown("particle attribute", name, self.columns)
@@ -306,7 +318,7 @@ class Particles:
     @property
     def columns(self) -> list[str]:
         """Names that `column` knows."""
-        return [*PLAIN, *self.attributes]
+        return [*BUILT_IN, *self.attributes]
 
     def _new_ids(self, n: int, ids: ArrayLike | None) -> NDArray[np.int64]:
         if ids is None:

@@ -351,7 +351,7 @@ def _plain(value: Any, where: str, folder: Path | None) -> Any:
     if isinstance(value, (Spread, Normal)):
         return asdict(value)
     if isinstance(value, Described):
-        return _table(FORCES, value, where, folder)
+        return _table(COLLIDERS if isinstance(value, Collider) else FORCES, value, where, folder)
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     if isinstance(value, Mapping):
@@ -395,6 +395,9 @@ def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, fol
     try:
         if isinstance(values.get("velocity"), Mapping):
             values["velocity"] = _made(FORCES, values["velocity"], f"{where}.velocity", folder)
+        if "around" in values:
+            solids = enumerate(values["around"])
+            values["around"] = [_made(COLLIDERS, solid, f"{where}.around.{k}", folder) for k, solid in solids]
         if "grid" in values:
             values["grid"] = _grid(values["grid"], folder)
         return registry[kind](**values)

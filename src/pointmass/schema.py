@@ -123,6 +123,7 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
 }
 UNKNOWN = (Any, "another value")
 FLOW_OR_VECTOR = "Vector | VelocityField"
+SOLIDS = "Sequence[Solid]"
 SHORT = {
     "Contact": "Literal['swept', 'discrete']",
     "Event": "Literal['death', 'birth', 'trail']",
@@ -256,6 +257,8 @@ def form_of(annotation: str) -> tuple[Any, str]:
     if annotation == FLOW_OR_VECTOR:
         kind, words = VECTOR
         return Union[kind, _flows()], f"{words}, or a table with the type of a flow"  # noqa: UP007
+    if annotation == SOLIDS:
+        return list[_one_of("colliders", tuple(COLLIDERS))], "a list of tables, each with the type of a collider"  # type: ignore[misc]
     return FORMS.get(annotation, UNKNOWN)
 
 
@@ -346,6 +349,9 @@ def _check_entry(where: str, what: str, table: Any, registry: Mapping[str, Any])
     nested = table.get("velocity")
     if what == "forces" and isinstance(nested, Mapping):
         _check_entry(f"{where}.velocity", "forces", nested, _flow_kinds())
+    if isinstance(around := table.get("around"), list):
+        for k, solid in enumerate(around):
+            _check_entry(f"{where}.around.{k}", "colliders", solid, COLLIDERS)
     grid = table.get("grid")
     if isinstance(grid, Mapping):
         _check_table(f"{where}.grid", GridTable, grid, f"{where}.grid.")

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pointmass.collisions import Plane, Sphere
 from pointmass.forces import FORCES, Vortex
 from pointmass.laws.elements import ElementForce
 from pointmass.laws.force import Blocks
@@ -31,6 +32,7 @@ JOINTS = [(0, 1, 2), (3, 2, 5)]
 RNG = np.random.default_rng(42)
 CELLS = RNG.standard_normal((2, 3, 4, 1, 3))
 CELL_PLACE = {"origin": (-2.0, -3.0, 0.0), "spacing": 1.7, "times": (0.0, 1.0)}
+CHANCE = [naive.hashed(i ^ naive.hashed(0)) // 256 / 2**24 for i in range(N)]
 CHARGE, CIRCULATION = RNG.uniform(-1, 1, N), RNG.uniform(-2, 2, N)
 
 
@@ -196,6 +198,88 @@ EXAMPLES: dict[str, list[Example]] = {
             lambda i: {"circulation": CIRCULATION[i] * TIME, "eps": 0.0},
             naive.point_vortices,
             pairs=True,
+        ),
+    ],
+    "vortex_line": [
+        Example(
+            {"a": ("t", -0.5, 0), "b": (1, 1, 0.5), "circulation": 2.0, "eps": 0.3},
+            lambda i: {"a": (TIME, -0.5, 0), "b": (1, 1, 0.5), "circulation": 2.0, "eps": 0.3},
+            naive.vortex_line,
+        )
+    ],
+    "vortex_ring": [
+        Example(
+            {"center": (0, "t", 0), "axis": (1, 2, 0), "radius": 0.8, "circulation": 2.0, "eps": 0.3},
+            lambda i: {"center": (0, TIME, 0), "axis": (1, 2, 0), "radius": 0.8, "circulation": 2.0, "eps": 0.3},
+            naive.vortex_ring,
+        )
+    ],
+    "gust": [
+        Example(
+            {"velocity": (3, 0.5, -1), "intensity": "0.2 + t", "length": 2.0, "lifetime": 0.8, "seed": 4},
+            lambda i: {
+                "function": lambda x, v, m, t: naive.gust(x, t, (3, 0.5, -1), 0.2 + TIME, 2.0, 0.8, 4),
+            },
+            naive.formula,
+        )
+    ],
+    "flutter": [
+        Example(
+            {"strength": (0.5, "t", 2), "lifetime": 0.3, "seed": 5},
+            lambda i: {
+                "function": lambda x, v, m, t: naive.flutter(t, CHANCE[i], (0.5, TIME, 2), 0.3, 5),
+            },
+            naive.formula,
+        )
+    ],
+    "diffusion": [
+        Example(
+            {"coefficient": "0.2 + t", "interval": 0.1, "seed": 6},
+            lambda i: {
+                "function": lambda x, v, m, t: [
+                    math.sqrt(2 * (0.2 + t) / 0.1) * naive.draw(CHANCE[i], 7, 6, axis) for axis in range(3)
+                ],
+            },
+            naive.formula,
+        )
+    ],
+    "buoyancy": [
+        Example(
+            {"temperature": "300 + 100*charge", "ambient": 290.0, "density": 0.1, "up": (0, 2, 1)},
+            lambda i: {
+                "temperature": 300 + 100 * CHARGE[i],
+                "ambient": 290.0,
+                "beta": 9.81 / 293,
+                "density": 0.1,
+                "alpha": 9.81 / 1.2,
+                "up": (0, 2, 1),
+            },
+            naive.buoyancy,
+        )
+    ],
+    "curl_noise": [
+        Example(
+            {"length": 2.0, "speed": "1 + t", "rate": 0.4, "octaves": 2, "gain": 0.7, "seed": 9},
+            lambda i: {"psi": naive.stream(2.0, 1 + TIME, 0.4, 2, 0.7, 9)},
+            naive.curl,
+        ),
+        Example(
+            {"length": 1.5, "rate": 0.0, "octaves": 1, "around": [Sphere((0.2, 0, 0), 0.5), Plane(("0.1*t", -1, 0))]},
+            lambda i: {
+                "psi": naive.stream(1.5, 1.0, None, 1, 0.5, 0),
+                "solids": [
+                    (
+                        1.5,
+                        lambda x, t: naive.dot(*2 * [naive.sub(x, (0.2, 0, 0))]) ** 0.5 - 0.5,
+                        lambda x, t: naive.scale(
+                            naive.dot(*2 * [naive.sub(x, (0.2, 0, 0))]) ** -0.5, naive.sub(x, (0.2, 0, 0))
+                        ),
+                    ),
+                    (1.5, lambda x, t: x[1] + 1, lambda x, t: (0, 1, 0)),
+                ],
+            },
+            naive.curl,
+            text=False,
         ),
     ],
     "wind": [

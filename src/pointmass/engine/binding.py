@@ -5,7 +5,7 @@ Which parameters are numbers, columns or functions of time is compiled; their va
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,13 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.engine import grids as grid_text
-from pointmass.engine.printing import statements
+from pointmass.engine import noise as noise_text
+from pointmass.engine.printing import Call, statements
 from pointmass.laws.force import Force
 from pointmass.laws.grid import Grid, GridLookup
 from pointmass.laws.parameter import Component, Parameter
 from pointmass.particles import Particles
 from pointmass.tracing.columns import expanded
-from pointmass.tracing.program import Primitive
+from pointmass.tracing.noise import Function
+from pointmass.tracing.program import Primitive, Program
 from pointmass.tracing.trace import Traced, vector_names
 
 Array = NDArray[np.floating[Any]]
@@ -167,7 +169,7 @@ class Binder:
         if "w" not in equal:
             self.attribute("w", "")
         self._grids: list[Grid] = []
-        self._lookups: list[GridLookup] = []
+        self._functions: dict[Hashable, tuple[str, str]] = {}  # name and text, in the order in which laws need them
 
     @property
     def arrays(self) -> list[str]:
@@ -189,18 +191,38 @@ class Binder:
     @property
     def functions(self) -> str:
         """Text of the functions that the laws call."""
-        looks = "".join(grid_text.look_up(lookup, f"look{k}") for k, lookup in enumerate(self._lookups))
-        return grid_text.ALONG + looks if looks else ""
+        return "".join(text for _, text in self._functions.values())
 
-    def call(self, primitive: Primitive, parts: list[str]) -> str:
-        """A call of a primitive."""
-        assert isinstance(primitive, GridLookup)
-        if primitive not in self._lookups:
-            self._lookups.append(primitive)
-        if primitive.grid not in self._grids:
-            self._grids.append(primitive.grid)
-        k = self._grids.index(primitive.grid)
-        return f"look{self._lookups.index(primitive)}({', '.join([*parts, *(f'grid{k}_{what}' for what in GRID)])})"
+    def caller(self, program: Program, precision: str = "") -> Call:
+        """How a program calls its primitives, in the precision of the kernel or another one."""
+        dtype = precision or self.dtype
+        found = dict.fromkeys(program.nodes[i][1] for i in program.live() if program.nodes[i][0] == "call")
+
+        def call(primitive: Primitive, parts: list[str]) -> tuple[str, int | None]:
+            if isinstance(primitive, GridLookup):
+                return self._look_up(primitive, parts), None
+            assert isinstance(primitive, Function)
+            together = tuple(p for p in found if isinstance(p, Function) and p.family == primitive.family)
+            name = self._function((dtype, together), lambda name: noise_text.function_of(together, name, dtype))
+            return f"{name}({', '.join(parts)})", together.index(primitive)
+
+        return call
+
+    def _look_up(self, lookup: GridLookup, parts: list[str]) -> str:
+        """A look-up in a grid."""
+        self._function("along", lambda name: grid_text.ALONG)
+        name = self._function(lookup, lambda name: grid_text.look_up(lookup, name))
+        if lookup.grid not in self._grids:
+            self._grids.append(lookup.grid)
+        k = self._grids.index(lookup.grid)
+        return f"{name}({', '.join([*parts, *(f'grid{k}_{what}' for what in GRID)])})"
+
+    def _function(self, key: Hashable, text: Callable[[str], str]) -> str:
+        """The name of a function, whose text is printed on its first use."""
+        if key not in self._functions:
+            name = f"call{len(self._functions)}"
+            self._functions[key] = name, text(name)
+        return self._functions[key][0]
 
     def attribute(self, name: str, index: str) -> str:
         """A column of the particles."""
@@ -247,7 +269,7 @@ class Binder:
                 names[name] = expression
                 at_time += timed
                 lines += own
-        body, outputs = statements(program, names, f"{tag}_", self.dtype, self.call)
+        body, outputs = statements(program, names, f"{tag}_", self.dtype, self.caller(program))
         return Text(at_time, lines + body, outputs)
 
     def selected(self, force: Force, index: str) -> str | None:
@@ -296,11 +318,11 @@ class Binder:
             return table.column(key, lambda: get().value, index), [], []  # type: ignore[arg-type, return-value]
         program = expanded(value.program)
         if not component.needs:
-            lines, (result,) = statements(program, {"t": time}, prefix, "float64")
+            lines, (result,) = statements(program, {"t": time}, prefix, "float64", self.caller(program, "float64"))
             bounds = _bounds(component, f"{prefix}q")
             return f"{prefix}r", [*lines, f"{prefix}q = {result}", f"{prefix}r = R({prefix}q)", *bounds], []
         names = {n: self.attribute(n, index) for n in component.needs} | {"t": f"R({time})"}
-        lines, (result,) = statements(program, names, prefix, self.dtype)
+        lines, (result,) = statements(program, names, prefix, self.dtype, self.caller(program))
         return result, [], lines
 
 

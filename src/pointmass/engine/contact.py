@@ -284,7 +284,7 @@ def _constants(order: int, lagged: bool, dtype: str) -> list[str]:
 
 
 def _printed(law: Traced, names: Mapping[str, str], prefix: str) -> tuple[list[str], list[str]]:
-    return statements(expanded(law.program), names, prefix, "float64")
+    return statements(expanded(law.program, inline=True), names, prefix, "float64")
 
 
 def _vector(name: str, *parts: str) -> dict[str, str]:

@@ -565,7 +565,8 @@ class _Law:
 
     def pair(self, first: dict[str, str], second: dict[str, str], prefix: str) -> tuple[list[str], list[str]]:
         """Statements and outputs for one pair, from expressions of the quantities of both."""
-        return statements(self.program, self._names(first, second), f"{self.tag}{prefix}", self.binder.dtype)
+        dtype, call = self.binder.dtype, self.binder.caller(self.program)
+        return statements(self.program, self._names(first, second), f"{self.tag}{prefix}", dtype, call)
 
     def mirrored(
         self, first: dict[str, str], second: dict[str, str], prefix: str
@@ -575,7 +576,8 @@ class _Law:
         other = {name: places["21"["12".index(node)], q] for name, (node, q) in self.inputs.items()}
         both = expanded(self.program)
         both.outputs += expanded(self.program, both, other).outputs
-        lines, outputs = statements(both, self._names(first, second), f"{self.tag}{prefix}", self.binder.dtype)
+        dtype, call = self.binder.dtype, self.binder.caller(both)
+        lines, outputs = statements(both, self._names(first, second), f"{self.tag}{prefix}", dtype, call)
         return lines, outputs[: self.sums], outputs[self.sums :]
 
     def _names(self, first: dict[str, str], second: dict[str, str]) -> dict[str, str]:
@@ -592,7 +594,8 @@ class _Law:
             names |= {n: f"{q}[3 * (g - base) + {a}]" for q in "xv" for a, n in enumerate(vector_names(q))}
             names |= {q: self.entry(q, index) for q in self._owned}
             names |= {"m": self.binder.attribute("m", "g")}
-            lines, outputs = statements(self.finish, names, f"{self.tag}e_", self.binder.dtype)
+            dtype, call = self.binder.dtype, self.binder.caller(self.finish)
+            lines, outputs = statements(self.finish, names, f"{self.tag}e_", dtype, call)
         return [f"g = {row}", *lines, *(f"F[3 * g + {a}] = {o}" for a, o in enumerate(outputs))]
 
     def _values(self, parameters: list[str], index: str) -> Any:

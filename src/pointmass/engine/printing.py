@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from pointmass.tracing.columns import INFIX
+from pointmass.tracing.noise import Whole
 from pointmass.tracing.program import Primitive, Program, operands
 
 CALLS = {
@@ -36,7 +37,8 @@ def literal(value: float, dtype: str) -> str:
     return f"({text})" if text.startswith("-") else text
 
 
-Call = Callable[[Primitive, list[str]], str]  # a call of a primitive as an expression
+# A call of a primitive: an expression, and which of its values it is if there are several.
+Call = Callable[[Primitive, list[str]], tuple[str, int | None]]
 
 
 def statements(
@@ -50,9 +52,10 @@ def statements(
     names : expression in the kernel of each input.
     prefix : of the local variables, which keeps several laws in one kernel apart.
     dtype : "float64" or "float32", the precision of every operation.
-    call : how primitives are called, where the program has any.
+    call : how primitives are called, where it has any besides operations on whole numbers.
     """
     text: dict[int, str] = {}
+    several: dict[str, str] = {}  # calls of functions that return several values
     lines = []
     for i in program.live():
         op, *rest = node = program.nodes[i]
@@ -64,14 +67,24 @@ def statements(
             text[i] = f"{prefix}{i}"
             parts = [text[o] for o in operands(node)]
             if op == "call":
-                assert call is not None
-                right = call(rest[0], parts)
+                right, place = _whole(rest[0], parts, dtype) if call is None else call(rest[0], parts)
+                if place is not None:
+                    if right not in several:
+                        several[right] = f"{prefix}{i}_all"
+                        lines.append(f"{several[right]} = {right}")
+                    right = f"{several[right]}[{place}]"
             elif op in CALLS:
                 right = CALLS[op].format(*parts)
             else:
                 right = f"{parts[0]} {INFIX[op]} {parts[1]}"
             lines.append(f"{text[i]} = {right}")
     return lines, [text[o] for o in program.outputs]
+
+
+def _whole(primitive: Primitive, parts: list[str], dtype: str) -> tuple[str, None]:
+    """An operation on whole numbers."""
+    assert isinstance(primitive, Whole)
+    return primitive.text.format(*parts, real=f"np.{dtype}"), None
 
 
 def indented(lines: Sequence[str], depth: int) -> list[str]:

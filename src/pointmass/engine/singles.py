@@ -229,7 +229,8 @@ class SinglesKernel:
         step += [f"{q}_{a} = {q}1_{a}" for q, a in self.state if q == "x"]
         step += [f"{q}_{a} = {motion._free(f'{q}1_{a}')}" for q, a in self.state if q == "v"]
         timed = motion.timed or (clear is not None and bool(clear.step))
-        unrolled = [u for u in UNROLLED if u == 1 or not (timed or len(step) > LONG)]
+        long = timed or len(step) > LONG or bool(motion.binder.functions)  # functions are longer than they look
+        unrolled = [u for u in UNROLLED if u == 1 or not long]
         lanes = [self._lanes(u, step, clear) for u in unrolled]
         first = motion.binder.functions if island is None else island.functions_text
         one = [] if island is None else [WAITS, *self._one_lane(step, clear)]

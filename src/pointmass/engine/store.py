@@ -32,7 +32,7 @@ Printed by pointmass {version} for {dtype}. It runs without Numba too: delete th
 import numpy as np
 from numba import njit, prange
 
-from pointmass.engine.support import added, columns, exponent, scaled, select, significand, subtracted
+from pointmass.engine.support import added, columns, exponent, mixed, scaled, select, significand, subtracted
 
 R = np.{dtype}
 OWNING = {{"_nrt": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True{fast}}}
@@ -143,8 +143,11 @@ def _surroundings() -> str:
     import numba
     import numpy as np
 
-    support = Path(__file__).with_name("support.py").read_text(encoding="utf-8")
-    return repr((numba.__version__, llvmlite.__version__, np.__version__, sys.version, sys.platform, support))
+    from pointmass.engine import support
+    from pointmass.tracing import noise
+
+    helpers = [Path(file).read_text(encoding="utf-8") for file in (support.__file__, noise.__file__)]
+    return repr((numba.__version__, llvmlite.__version__, np.__version__, sys.version, sys.platform, helpers))
 
 
 def _written(key: str, source: str) -> Path:

@@ -10,6 +10,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload, register_jitable
 
+from pointmass.tracing import noise
+
 TINY = 2.0**-1022
 RAISE = 2.0**54
 LIMIT = 2000.0
@@ -97,6 +99,9 @@ def exponent(a: Any) -> Any:
     special = wide == 0.0 or not abs(wide) < np.inf
     e = ((bits >> 52) & 0x7FF) - 1022 - (54 if tiny else 0)
     return type(a)(0 if special else e)
+
+
+mixed = register_jitable(noise.mixed)
 
 
 def select(condition: Any, a: Any, b: Any) -> Any:

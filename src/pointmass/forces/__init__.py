@@ -5,12 +5,17 @@ from __future__ import annotations
 from pointmass.errors import unknown
 from pointmass.forces.angles import Angles
 from pointmass.forces.attractor import Attractor
+from pointmass.forces.buoyancy import Buoyancy
+from pointmass.forces.curl_noise import CurlNoise
+from pointmass.forces.diffusion import Diffusion
 from pointmass.forces.drag import Drag
 from pointmass.forces.field import Field
 from pointmass.forces.flow import Flow
+from pointmass.forces.flutter import Flutter
 from pointmass.forces.gravitation import Gravitation
 from pointmass.forces.gravity import Gravity
 from pointmass.forces.grid_files import load_grid
+from pointmass.forces.gust import Gust
 from pointmass.forces.harmonic import Harmonic
 from pointmass.forces.lennard_jones import LennardJones
 from pointmass.forces.magnetic import Magnetic
@@ -19,6 +24,8 @@ from pointmass.forces.quadratic_drag import QuadraticDrag
 from pointmass.forces.soft_sphere import SoftSphere
 from pointmass.forces.springs import Springs
 from pointmass.forces.vortex import Vortex
+from pointmass.forces.vortex_line import VortexLine
+from pointmass.forces.vortex_ring import VortexRing
 from pointmass.forces.wind import Wind
 from pointmass.laws.force import Force
 
@@ -34,10 +41,17 @@ FORCES: dict[str, type[Force]] = {
     "lennard_jones": LennardJones,
     "soft_sphere": SoftSphere,
     "vortex": Vortex,
+    "vortex_line": VortexLine,
+    "vortex_ring": VortexRing,
     "point_vortices": PointVortices,
+    "curl_noise": CurlNoise,
+    "gust": Gust,
+    "flutter": Flutter,
+    "diffusion": Diffusion,
     "wind": Wind,
     "field": Field,
     "flow": Flow,
+    "buoyancy": Buoyancy,
     "magnetic": Magnetic,
 }
 
@@ -45,12 +59,17 @@ __all__ = [
     "FORCES",
     "Angles",
     "Attractor",
+    "Buoyancy",
+    "CurlNoise",
+    "Diffusion",
     "Drag",
     "Field",
     "Flow",
+    "Flutter",
     "Force",
     "Gravitation",
     "Gravity",
+    "Gust",
     "Harmonic",
     "LennardJones",
     "Magnetic",
@@ -59,6 +78,8 @@ __all__ = [
     "SoftSphere",
     "Springs",
     "Vortex",
+    "VortexLine",
+    "VortexRing",
     "Wind",
     "find_force",
     "load_grid",

@@ -16,7 +16,14 @@ import numpy as np
 
 from pointmass.errors import InvalidInput, unknown
 from pointmass.tracing import functions as fn
+from pointmass.tracing.noise import noise
 from pointmass.tracing.program import Symbol
+
+
+def seeded_noise(x: Any, y: Any, z: Any, t: Any, seed: Any) -> Any:
+    """Gradient noise of features of size 1: mean 0, root mean square 1 (see `pm.noise`)."""
+    return noise(x, y, z, t, seed=seed)
+
 
 FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
     "sin": (fn.sin, 1),
@@ -32,6 +39,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], int]] = {
     "min": (fn.minimum, 2),
     "max": (fn.maximum, 2),
     "where": (fn.where, 3),
+    "noise": (seeded_noise, 5),
 }
 CONSTANTS = {"pi": math.pi, "e": math.e}
 BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
@@ -103,7 +111,7 @@ class Formula:
             raise InvalidInput(f"{self.what} nests more than {DEEPEST} operations: split it into several formulas")
         values = [self._check(part, depth + 1) for part in self._parts(node)]
         if isinstance(node, ast.Name) and node.id in FUNCTIONS:
-            call = f"{node.id}({', '.join('xyz'[: FUNCTIONS[node.id][1]])})"
+            call = f"{node.id}({', '.join('xyzts'[: FUNCTIONS[node.id][1]])})"
             raise InvalidInput(
                 f"{self.what} {self.shown!r}: {node.id} is a function, so write it with brackets: {call}"
             )

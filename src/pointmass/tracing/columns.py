@@ -20,13 +20,16 @@ INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", 
 FLOATS = (np.dtype(np.float64), np.dtype(np.float32))
 
 
-def expanded(program: Program, after: Program | None = None, names: Mapping[str, str] | None = None) -> Program:
+def expanded(
+    program: Program, after: Program | None = None, names: Mapping[str, str] | None = None, inline: bool = False
+) -> Program:
     """The program with sin, exp, ... replaced by their polynomials.
 
     Parameters
     ----------
     after : a program whose operations go before, so that those which are equal are stored once.
     names : new names of inputs.
+    inline : whether primitives are replaced by operations too, where they can.
     """
     result = Program() if after is None else replace(after, outputs=[])
     new: dict[int, int] = {}
@@ -40,7 +43,8 @@ def expanded(program: Program, after: Program | None = None, names: Mapping[str,
         elif node[0] == "arg":
             new[i] = result.argument((names or {}).get(node[1], node[1]))
         elif node[0] == "call":
-            new[i] = result.call(node[1], *moved)
+            inlined = node[1].inlined(*(Symbol(result, m) for m in moved)) if inline else None
+            new[i] = result.call(node[1], *moved) if inlined is None else result_node(result, inlined)
         else:
             new[i] = result.operation(node[0], *moved)
     result.outputs = [new[o] for o in program.outputs]

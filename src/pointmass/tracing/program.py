@@ -234,6 +234,10 @@ class Primitive:
         """The primitive, with the same arguments, that is the derivative to one of them."""
         raise NotImplementedError
 
+    def inlined(self, *arguments: Symbol) -> Any:
+        """The value as operations on symbols, for a place that calls no functions; None where it has none."""
+        return None
+
 
 class Symbol:
     """A number that is not known yet: what a law sees while it is traced."""
