@@ -245,6 +245,18 @@ def fountain():
     shipped("fountain", 170)
 
 
+def curl_noise():
+    """Stripes of dust, carried around a ball by curl noise for a second."""
+    ball = pm.Sphere(radius=0.35)
+    x = np.random.default_rng(1).uniform((-1.9, -1.0, -0.02), (1.9, 1.0, 0.02), (90_000, 3))
+    x = x[(np.floor(6 * x[:, 1]) % 2 == 0) & (np.linalg.norm(x, axis=1) > 0.36)]
+    air = pm.CurlNoise(0.9, 0.5, rate=0.3, seed=3, around=[ball], distance=0.4)
+    dust = pm.ParticleSystem(pm.Particles(x, height=x[:, 1], dtype="float32"), [air], [ball])
+    look = pm.Look(particles="glow", size=0.006, color_by="height", brightness=0.5)
+    frame = last(pm.Simulation(dust, pm.Midpoint(), 1 / 60, look=look).frames(2, 1))
+    save("curl-noise", frame, pm.Camera(position=(0, 0, 5.6), target=(0, 0, 0), fov=20.0))
+
+
 PICTURES = (
     readme,
     flow,
@@ -253,10 +265,15 @@ PICTURES = (
     drag,
     bounces,
     cloth,
+<<<<<<< HEAD
     coin,
     sparks,
     smoke,
     snow,
+=======
+    capsule,
+    curl_noise,
+>>>>>>> fields
     pendulum,
     bounce,
     flow_scene,
