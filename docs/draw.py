@@ -265,15 +265,11 @@ PICTURES = (
     drag,
     bounces,
     cloth,
-<<<<<<< HEAD
     coin,
     sparks,
     smoke,
     snow,
-=======
-    capsule,
     curl_noise,
->>>>>>> fields
     pendulum,
     bounce,
     flow_scene,
