@@ -245,6 +245,21 @@ def fountain():
     shipped("fountain", 170)
 
 
+def fireworks():
+    """The shipped scene fireworks."""
+    shipped("fireworks", 340)
+
+
+def snow_scene():
+    """The shipped scene snow."""
+    shipped("snow", 235)
+
+
+def smoke_scene():
+    """The shipped scene smoke."""
+    shipped("smoke", 355)
+
+
 def curl_noise():
     """Stripes of dust, carried around a ball by curl noise for a second."""
     ball = pm.Sphere(radius=0.35)
@@ -276,6 +291,9 @@ PICTURES = (
     orbit,
     springs,
     fountain,
+    fireworks,
+    snow_scene,
+    smoke_scene,
 )
 
 

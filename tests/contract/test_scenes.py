@@ -15,6 +15,9 @@ SMALL = {  # fewer particles where the default takes long; the physics is the sa
     "flow": {"particles": 200, "arrows": 6, "streamlines": 6},
     "springs": {"side": 4},
     "fountain": {"rate": 200},
+    "fireworks": {"height": 8.0, "stars": 40, "launches": 4.0, "smoke": 3, "tail": 20.0},
+    "snow": {"rate": 60.0},
+    "smoke": {"rate": 60.0},
     "bounce": {"balls": 20},
 }
 VARIANTS = [(name, SMALL.get(name, {})) for name in SCENES] + [
@@ -74,8 +77,16 @@ def test_every_scene_has_presets() -> None:
     )
 
 
-QUICK = {"flow": {"particles": 20, "arrows": 0, "streamlines": 0}, "springs": {"side": 3}, "bounce": {"balls": 10}}
-COSTLY = {"balls", "rate", "links", "side", "particles", "mass", "stiffness", "steps_per_second"}  # only so many steps
+QUICK = {
+    "flow": {"particles": 20, "arrows": 0, "streamlines": 0},
+    "springs": {"side": 3},
+    "bounce": {"balls": 10},
+    **{name: SMALL[name] for name in ("fireworks", "snow", "smoke")},
+}
+COSTLY = {  # only so many steps
+    *("balls", "rate", "links", "side", "particles", "mass", "stiffness", "steps_per_second"),
+    *("launches", "stars", "tail", "smoke"),
+}
 ENDS = [
     (name, parameter["name"], value)
     for name, shipped in SCENES.items()

@@ -21,8 +21,13 @@ Triple = tuple[Any, ...]
 class Solid(Protocol):
     """What a collider tells about its shape: see `collisions.Collider`."""
 
-    distance_law: Callable[..., Any]
-    normal_law: Callable[..., Any]
+    @property
+    def distance_law(self) -> Callable[..., Any]:
+        """Signed distance [m]."""
+
+    @property
+    def normal_law(self) -> Callable[..., Any]:
+        """Unit normal."""
 
     @property
     def shape(self) -> tuple[float, ...]:
