@@ -423,7 +423,7 @@ class IslandMembers:
         dtype = self.kernel.system.particles.dtype
         data = deriv.binder.data(count, self.order)
         contact = [] if deriv.contact is None else [deriv.contact.table()]
-        died = np.zeros(count, np.int64)
+        died = np.zeros(count, np.uint8)
         starts, most = [], [int(np.diff(self.first).max(initial=0))]
         for k, family in enumerate(deriv.families):
             data += [self.tiles[k].nodes, family.tiled.array(len(self.tiled[k]), dtype, self.tiled[k])]

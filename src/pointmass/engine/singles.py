@@ -434,7 +434,7 @@ class SingleMembers:
         status, reach = np.zeros(tiles, np.int64), np.zeros((tiles, 2), x.dtype)
         grid = (span.t0, span.dt, span.first, span.count)
         kernel, scratch = self.kernel.functions["run"], self.kernel.functions["scratch"]
-        died = np.zeros(count, np.int64)
+        died = np.zeros(count, np.uint8)
         mortal = [died] if self.kernel.system.colliders else []
         arrays = (x, v, *kept, *data, *grid, status, reach, *mortal)
         spread(lambda lo, hi: kernel(lo, hi, *arrays, *scratch([1])), tiles, GRAIN)
