@@ -17,7 +17,7 @@ from pointmass.bodies import BODIES, Body, join
 from pointmass.collisions import COLLIDERS
 from pointmass.collisions.collider import Collider
 from pointmass.description import Described
-from pointmass.emitters import EMITTERS, Normal, Spread
+from pointmass.emitters import Normal, Spread
 from pointmass.emitters.emitter import Emitter
 from pointmass.errors import InvalidInput, number, unknown, whole_number
 from pointmass.forces import FORCES, load_grid
@@ -26,21 +26,15 @@ from pointmass.laws.force import Force
 from pointmass.laws.grid import Grid
 from pointmass.look import Look
 from pointmass.particles import Particles
+from pointmass.registries import LISTS
 from pointmass.simulation import DEFAULT_DT, Simulation
 from pointmass.solvers import SOLVERS, find_solver
 from pointmass.solvers.base import Solver
 from pointmass.system import ParticleSystem
 from pointmass.toml import dumps
-from pointmass.zones import WHEN_FULL, ZONES, WhenFull, Zone
+from pointmass.zones import WHEN_FULL, WhenFull, Zone
 
 VERSION = 1
-LISTS: dict[str, Mapping[str, Any]] = {
-    "bodies": BODIES,
-    "forces": FORCES,
-    "colliders": COLLIDERS,
-    "emitters": EMITTERS,
-    "zones": ZONES,
-}
 HOLDS: dict[str, type] = {"bodies": Body, "forces": Force, "colliders": Collider, "emitters": Emitter, "zones": Zone}
 PLAIN = ("name", "summary", "dt", "frames", "fps", "seed", "dtype", "max_particles", "when_full")
 

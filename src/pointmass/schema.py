@@ -19,27 +19,19 @@ from typing import Annotated, Any, ClassVar, Literal, Union
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
-from pointmass.bodies import BODIES
 from pointmass.collisions import COLLIDERS
 from pointmass.description import parameters_of
-from pointmass.emitters import EMITTERS
 from pointmass.errors import InvalidInput, shown, unknown
 from pointmass.forces import FORCES
 from pointmass.frame import Camera
 from pointmass.laws.unary import VelocityField
 from pointmass.look import OF_PARTICLES, Look
+from pointmass.registries import LISTS
 from pointmass.simulation import DEFAULT_DT
 from pointmass.solvers import ALIASES, SOLVERS, find_solver
-from pointmass.zones import WHEN_FULL, ZONES
+from pointmass.zones import WHEN_FULL
 
 VERSION = 1
-LISTS: dict[str, Mapping[str, Any]] = {
-    "bodies": BODIES,
-    "forces": FORCES,
-    "colliders": COLLIDERS,
-    "emitters": EMITTERS,
-    "zones": ZONES,
-}
 DTYPES = ("float64", "float32")
 LARGEST = 2**63 - 1
 MAY_LAST = re.compile(r"emitters\.|bodies\.\d+\.lifetime")  # values that may be infinite

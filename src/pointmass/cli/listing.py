@@ -59,7 +59,8 @@ def _scenes() -> list[Entry]:
 
 def _named(name: str) -> list[Entry]:
     """Everything of this name: a scene and a type may share it."""
-    from pointmass.schema import LISTS, entry_model, settings_model
+    from pointmass.registries import LISTS
+    from pointmass.schema import entry_model, settings_model
     from pointmass.solvers import ALIASES, SOLVERS
 
     found = [{"kind": "scene", **scene} for scene in _scenes() if scene["name"] == name]
@@ -104,7 +105,7 @@ def _print(show: Any, what: Any) -> None:
 
 
 def _print_all(console: Any, scenes: list[Entry]) -> None:
-    from pointmass.schema import LISTS
+    from pointmass.registries import LISTS
     from pointmass.solvers import ALIASES, SOLVERS
 
     console.print("[bold]Scenes[/], with the parameters that --set changes, and presets for --preset")

@@ -8,7 +8,7 @@ from math import sqrt
 from typing import Any, Protocol
 
 from pointmass.errors import InvalidInput, shown, whole_number
-from pointmass.laws.parameter import Parameter, Scalar
+from pointmass.laws.parameter import Parameter, Scalar, seed_parameter
 from pointmass.laws.unary import VelocityField
 from pointmass.particles import Selection
 from pointmass.tracing import functions as fn
@@ -86,7 +86,7 @@ class CurlNoise(VelocityField):
             Parameter("length", length, unit="m", above=0),
             Parameter("speed", speed, unit="m/s"),
             Parameter("gain", gain, at_least=0),
-            Parameter("seed", float(whole_number("seed", seed, at_least=0) % 2**24)),
+            seed_parameter(seed),
             Parameter("rate", rate, unit="1/s", at_least=0),
         ]
         self.still = parameters[-1].constant and parameters[-1].at(0.0) == (0.0,)

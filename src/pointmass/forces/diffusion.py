@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pointmass.errors import whole_number
-from pointmass.laws.parameter import Parameter, Scalar
+from pointmass.laws.parameter import Parameter, Scalar, seed_parameter
 from pointmass.laws.unary import VelocityField
 from pointmass.particles import Selection
 from pointmass.tracing import functions as fn
@@ -44,7 +43,7 @@ class Diffusion(VelocityField):
         parameters = [
             Parameter("coefficient", coefficient, unit="m^2/s", at_least=0),
             Parameter("interval", interval, unit="s", above=0),
-            Parameter("seed", float(whole_number("seed", seed, at_least=0) % 2**24)),
+            seed_parameter(seed),
             Parameter("chance", "chance"),
         ]
         super().__init__(parameters, on, enabled)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from math import exp, sqrt, tanh
 from typing import Any
 
-from pointmass.errors import whole_number
-from pointmass.laws.parameter import Parameter, Scalar, Vector
+from pointmass.laws.parameter import Parameter, Scalar, Vector, seed_parameter
 from pointmass.laws.unary import VelocityField
 from pointmass.particles import Selection
 from pointmass.tracing import functions as fn
@@ -56,7 +55,7 @@ class Flutter(VelocityField):
         parameters = [
             Parameter("strength", strength, vector=True, unit="m/s"),
             Parameter("lifetime", lifetime, unit="s", above=0),
-            Parameter("seed", float(whole_number("seed", seed, at_least=0) % 2**24)),
+            seed_parameter(seed),
             Parameter("chance", "chance"),
         ]
         super().__init__(parameters, on, enabled)

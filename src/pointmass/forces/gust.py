@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from pointmass.errors import InvalidInput, shown, whole_number
-from pointmass.laws.parameter import Parameter, Scalar, Vector
+from pointmass.errors import InvalidInput, shown
+from pointmass.laws.parameter import Parameter, Scalar, Vector, seed_parameter
 from pointmass.laws.unary import VelocityField
 from pointmass.particles import Selection
 from pointmass.tracing import functions as fn
@@ -56,7 +56,7 @@ class Gust(VelocityField):
             Parameter("intensity", intensity, at_least=0),
             Parameter("length", length, unit="m", above=0),
             Parameter("lifetime", lifetime, unit="s", above=0),
-            Parameter("seed", float(whole_number("seed", seed, at_least=0) % 2**24)),
+            seed_parameter(seed),
         ]
         super().__init__(parameters, on, enabled)
 

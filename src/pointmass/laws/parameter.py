@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.errors import InvalidInput, finite_array, floats, number, shown
+from pointmass.errors import InvalidInput, finite_array, floats, number, shown, whole_number
 from pointmass.laws.formula import Formula
 from pointmass.particles import Particles
 from pointmass.tracing.program import flatten
@@ -184,3 +184,14 @@ def _ndim(value: Any) -> int:
     """Dimensions of an array of numbers; 0 for anything else."""
     array = floats(value)
     return 0 if array is None else array.ndim
+
+
+def seed_parameter(seed: int) -> Parameter:
+    """The parameter "seed" of a random law: a whole number, of which the 24 bits count that float32 holds.
+
+    Raises
+    ------
+    InvalidInput
+        It is not a whole number, or below 0.
+    """
+    return Parameter("seed", float(whole_number("seed", seed, at_least=0) % 2**24))
