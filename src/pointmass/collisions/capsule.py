@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.collisions.collider import Array, Collider, Contact, Response
+from pointmass.collisions.collider import Array, Contact, Response
 from pointmass.collisions.laws import all_of, along
-from pointmass.collisions.revolution import AROUND, axis_between, on_axis, revolved, turned
-from pointmass.errors import number
+from pointmass.collisions.revolution import AROUND, Round, on_axis, revolved, turned
 from pointmass.laws.parameter import Vector
 from pointmass.tracing.functions import Number, Triple, dot, length, maximum, minimum, scale, sub, where
 from pointmass.tracing.program import Vector as Triplet
 
 
-class Capsule(Collider):
+class Capsule(Round):
     """All that is within a radius of a line between two points, or with `inside` the room in it.
 
     Parameters
@@ -28,10 +27,6 @@ class Capsule(Collider):
     shift : moves the whole capsule [m]; a function of t.
     restitution, friction, eps, contact, response : as for every collider.
     """
-
-    bulges: ClassVar[bool]
-    smooth: ClassVar[bool] = True
-    place: ClassVar[str] = "shift"
 
     def __init__(
         self,
@@ -48,10 +43,7 @@ class Capsule(Collider):
         response: Response = "bounce",
     ) -> None:
         super().__init__(shift, restitution, friction, eps, contact, response)
-        self.middle, self.direction, self.half = axis_between(a, b)
-        self.radius = number("radius", radius, above=0, unit="m")
-        self.bulges = not inside  # type: ignore[misc]  # a property of this capsule
-        self.sign = -1.0 if inside else 1.0
+        self._around(a, b, radius, inside)
 
     @staticmethod
     def distance_law(x: Triple, *shape: Number) -> Number:
@@ -75,11 +67,6 @@ class Capsule(Collider):
         ways = [_from_line(p, shape) for p in points]
         within = all_of(dot(d, d) < inner * inner for d in ways) & (inner > 0.0)
         return where(sign > 0.0, far, within)
-
-    @property
-    def shape(self) -> tuple[float, ...]:
-        """The middle of the line, its direction, half its length, the radius, the side of the free space."""
-        return (*self.middle.tolist(), *self.direction.tolist(), self.half, self.radius, self.sign)
 
     def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:
         quarter = np.linspace(0, np.pi / 2, AROUND // 4 + 1)

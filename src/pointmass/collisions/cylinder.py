@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 from pointmass.collisions.collider import Array, Collider, Contact, Response
 from pointmass.collisions.laws import all_of, along
 from pointmass.collisions.plane import Plane
-from pointmass.collisions.revolution import axis_between, on_axis, revolved, turned
-from pointmass.errors import number
+from pointmass.collisions.revolution import Round, on_axis, revolved, turned
 from pointmass.laws.parameter import Vector
 from pointmass.tracing.functions import Number, Triple, absolute, dot, length, maximum, minimum, scale, sqrt, sub, where
 from pointmass.tracing.program import Vector as Triplet
 
 
-class Cylinder(Collider):
+class Cylinder(Round):
     """A round block between two points, or with `inside` a room of a tube and two flat ends.
 
     Parameters
@@ -29,10 +28,6 @@ class Cylinder(Collider):
     shift : moves the whole cylinder [m]; a function of t.
     restitution, friction, eps, contact, response : as for every collider.
     """
-
-    bulges: ClassVar[bool]
-    smooth: ClassVar[bool] = True
-    place: ClassVar[str] = "shift"
 
     def __init__(
         self,
@@ -49,10 +44,7 @@ class Cylinder(Collider):
         response: Response = "bounce",
     ) -> None:
         super().__init__(shift, restitution, friction, eps, contact, response)
-        self.middle, self.direction, self.half = axis_between(a, b)
-        self.radius = number("radius", radius, above=0, unit="m")
-        self.bulges = not inside  # type: ignore[misc]  # a property of this cylinder
-        self.sign = -1.0 if inside else 1.0
+        self._around(a, b, radius, inside)
         self.walls = [self._tube(a, b, radius), self._end(-1.0), self._end(1.0)] if inside else []
 
     @property
@@ -86,11 +78,6 @@ class Cylinder(Collider):
         inner = radius - room
         within = all_of((dot(d, d) < inner * inner) & (absolute(s) < half - room) for s, d in ways) & (inner > 0.0)
         return where(sign > 0.0, far, within)
-
-    @property
-    def shape(self) -> tuple[float, ...]:
-        """The middle, the direction and half the length of the axis, the radius, the side of the free space."""
-        return (*self.middle.tolist(), *self.direction.tolist(), self.half, self.radius, self.sign)
 
     def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:
         r, h = self.radius, self.half

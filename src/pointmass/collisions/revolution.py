@@ -2,17 +2,47 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pointmass.collisions.collider import Array, unit
-from pointmass.errors import InvalidInput, finite_array
+from pointmass.collisions.collider import Array, Collider, unit
+from pointmass.errors import InvalidInput, finite_array, number
 from pointmass.tracing.functions import Number, Triple, dot, scale, sub
 from pointmass.tracing.program import Vector as Triplet
 
 AROUND = 64  # corners of a circle
+
+
+class Round(Collider):
+    """A body around a piece of an axis, with one radius: see `Capsule` and `Cylinder`.
+
+    Attributes
+    ----------
+    middle, direction, half : of the axis: its middle [m], a unit vector along it, half its length [m].
+    radius : [m].
+    sign : 1 if the free space is outside, -1 if it is inside.
+    """
+
+    bulges: ClassVar[bool]
+    smooth: ClassVar[bool] = True
+    place: ClassVar[str] = "shift"
+    middle: Array
+    direction: Array
+    half: float
+
+    def _around(self, a: Any, b: Any, radius: float, inside: bool) -> None:
+        """Lie around the axis from `a` to `b`."""
+        self.middle, self.direction, self.half = axis_between(a, b)
+        self.radius = number("radius", radius, above=0, unit="m")
+        self.bulges = not inside  # type: ignore[misc]  # a property of this body
+        self.sign = -1.0 if inside else 1.0
+
+    @property
+    def shape(self) -> tuple[float, ...]:
+        """The middle of the axis, its direction, half its length, the radius, the side of the free space."""
+        return (*self.middle.tolist(), *self.direction.tolist(), self.half, self.radius, self.sign)
 
 
 def axis_between(a: Any, b: Any) -> tuple[Array, Array, float]:
