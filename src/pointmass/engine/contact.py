@@ -76,6 +76,8 @@ class ContactText:
     ----------
     text : the functions.
     record : how many numbers of scratch a particle takes.
+    kills : whether a surface kills.
+    discrete : whether there is anything to `bounce` off.
     """
 
     def __init__(self, surfaces: Sequence[Collider], order: int, lagged: bool, dtype: str) -> None:
@@ -84,7 +86,9 @@ class ContactText:
         self._kinds = list(dict.fromkeys(s.laws for s in surfaces))
         self._motions = list({id(s.motion): s.motion for s in surfaces if s.moves}.values())
         body = Path(__file__).with_name("contact_text.py").read_text(encoding="utf-8").split(MARK)[1]
-        printed = [*_constants(order, lagged, dtype), "", *self._laws(), *self._places()]
+        self.kills = any(s.response == "kill" for s in surfaces)
+        self.discrete = order == 2 and any(s.contact == "discrete" for s in surfaces)
+        printed = [*self._constants(order, lagged), "", *self._laws(), *self._places()]
         self.text = "\n".join([*printed, body.strip("\n"), "", "", *self._clear()])
 
     def table(self) -> NDArray[np.float64]:
@@ -95,11 +99,28 @@ class ContactText:
             motion = 1 + [id(m) for m in self._motions].index(id(s.motion)) if s.moves else 0
             place = [c.value if isinstance(c.value, float) else 0.0 for c in s.motion.parameters[0].components]
             room = s.eps + ROUNDING[self._dtype] * float(np.abs(place).sum())
-            flat = not s.curved and not s.moves
-            numbers: list[float] = [self._kinds.index(s.laws), s.contact == "swept", motion, s.bulges, flat]
+            numbers: list[float] = [self._kinds.index(s.laws), s.contact == "swept", motion, s.bulges, _flat(s)]
             numbers += [RESPONSES.index(s.response), *s.impact, s.eps, room, *place, *s.shape]
             row[: len(numbers)] = numbers
         return result
+
+    def _constants(self, order: int, lagged: bool) -> list[str]:
+        """Names for numbers, and which branches there are: those that no surface takes are not compiled."""
+        offsets = np.cumsum([0, *RECORD.values()]).tolist()
+        numbers = {name: k for k, name in enumerate(TABLE) if name} | dict(zip(RECORD, offsets, strict=False))
+        numbers |= {"RECORD": offsets[-1], "ORDER": order, "LAGGED": lagged, "PASSES": contact.PASSES}
+        numbers |= {"SQUARINGS": contact.PASSES.bit_length() - 1, "MOST_CHORDS": float(swept.MOST_CHORDS)}
+        numbers |= {"NEWTON_STEPS": swept.NEWTON_STEPS, "ROOT_STEPS": swept.ROOT_STEPS, "BACK_STEPS": swept.BACK_STEPS}
+        numbers |= {"RESOLUTION": swept.RESOLUTION}
+        numbers |= {"STICK": RESPONSES.index("stick"), "KILL": RESPONSES.index("kill"), "KILLED": KILLED}
+        numbers |= {"MOST_EVENTS": MOST_EVENTS, "EVICTIONS": EVICTIONS, "SETTLED": contact.SETTLED}
+        rounding = contact.STILL * float(np.finfo(self._dtype).eps)
+        numbers |= {"ROUND": rounding, "CREEP": max(contact.CREEP, rounding)}
+        flat = [_flat(s) for s in self.surfaces]
+        numbers |= {"KILLS": self.kills, "STICKY": any(s.response == "stick" for s in self.surfaces)}
+        numbers |= {"FLATS": any(flat), "CURVED": not all(flat), "MOVING": bool(self._motions)}
+        numbers |= {"BULGING": any(s.bulges for s, f in zip(self.surfaces, flat, strict=True) if not f)}
+        return [f"{name} = {value!r}" for name, value in numbers.items()]
 
     # ------------------------------------------------------------------------------------------------ laws
 
@@ -148,7 +169,7 @@ class ContactText:
         lines.begin.append(f"size = radius + {rounding} * ({' + '.join(f'abs({p})' for p in PATH[:3])})")
         lines.end.append(f"size = size + {rounding} * ({' + '.join(f'abs({p})' for p in PATH[6:9])})")
         for k, surface in enumerate(self.surfaces):
-            if not surface.curved and not surface.moves:
+            if _flat(surface):
                 self._clear_of_plane(k, dtype, table, lines)
                 continue
             if "safe = True" not in lines.begin:
@@ -260,6 +281,11 @@ class ClearLines:
         return " & ".join(f"({r})" for r in self.results) or "True"
 
 
+def _flat(surface: Collider) -> bool:
+    """Whether it is a plane at rest: a path crosses it where a polynomial is 0."""
+    return not surface.curved and not surface.moves
+
+
 def _legs() -> list[str]:
     """Coordinates of the legs of the control polygon."""
     return [
@@ -267,20 +293,6 @@ def _legs() -> list[str]:
         for a, b in zip("xyz", "uvw", strict=True)
         for leg in (f"third * {b}0", f"third * {b}1", f"({a}1 - {a}0) - third * ({b}0 + {b}1)")
     ]
-
-
-def _constants(order: int, lagged: bool, dtype: str) -> list[str]:
-    offsets = np.cumsum([0, *RECORD.values()]).tolist()
-    numbers = {name: k for k, name in enumerate(TABLE) if name} | dict(zip(RECORD, offsets, strict=False))
-    numbers |= {"RECORD": offsets[-1], "ORDER": order, "LAGGED": lagged, "PASSES": contact.PASSES}
-    numbers |= {"SQUARINGS": contact.PASSES.bit_length() - 1, "MOST_CHORDS": float(swept.MOST_CHORDS)}
-    numbers |= {"NEWTON_STEPS": swept.NEWTON_STEPS, "ROOT_STEPS": swept.ROOT_STEPS, "BACK_STEPS": swept.BACK_STEPS}
-    numbers |= {"RESOLUTION": swept.RESOLUTION}
-    numbers |= {"STICK": RESPONSES.index("stick"), "KILL": RESPONSES.index("kill"), "KILLED": KILLED}
-    numbers |= {"MOST_EVENTS": MOST_EVENTS, "EVICTIONS": EVICTIONS, "SETTLED": contact.SETTLED}
-    rounding = contact.STILL * float(np.finfo(dtype).eps)
-    numbers |= {"ROUND": rounding, "CREEP": max(contact.CREEP, rounding)}
-    return [f"{name} = {value!r}" for name, value in numbers.items()]
 
 
 def _printed(law: Traced, names: Mapping[str, str], prefix: str) -> tuple[list[str], list[str]]:

@@ -45,7 +45,10 @@ def distance(P, k, t, x, y, z):
 def near(P, t, x, y, z, radius):
     """Whether a particle is within reach of a surface: if so, `find` wants to know its acceleration."""
     for k in range(len(P)):
-        if P[k, RESPONSE] != KILL and distance(P, k, t, x, y, z) - radius <= P[k, NEAR]:
+        if KILLS:
+            if P[k, RESPONSE] == KILL:
+                continue
+        if distance(P, k, t, x, y, z) - radius <= P[k, NEAR]:
             return True
     return False
 
@@ -58,7 +61,10 @@ def find(P, C, o, t, x, y, z, vx, vy, vz, m, ax, ay, az, radius):
         px, py, pz = place_of(P, k, t)
         lx, ly, lz = x - px, y - py, z - pz
         gap = gap_of(P, k, lx, ly, lz) - radius
-        if P[k, RESPONSE] == KILL or not gap <= P[k, NEAR]:
+        if KILLS:
+            if P[k, RESPONSE] == KILL:
+                continue
+        if not gap <= P[k, NEAR]:
             continue
         nx, ny, nz = normal_of(P, k, lx, ly, lz)
         gx, gy, gz = ground_of(P, k, t)
@@ -71,7 +77,9 @@ def find(P, C, o, t, x, y, z, vx, vy, vz, m, ax, ay, az, radius):
             lift = dot3(ax - bx, ay - by, az - bz, nx, ny, nz) + bending_of(P, k, lx, ly, lz, ux, uy, uz)
             slow = abs(dot3(ux, uy, uz, nx, ny, nz)) <= np.sqrt(2 * P[k, NEAR] * abs(lift))
             stands = lift < 0 and slow
-        if stands or P[k, RESPONSE] == STICK:
+        if STICKY:
+            stands = stands or P[k, RESPONSE] == STICK
+        if stands:
             r = o + 1 + RECORD * count
             count += 1
             C[r + ON] = k
@@ -107,8 +115,9 @@ def choose_slide(P, C, r, t, vx, vy, vz, m, ax, ay, az):
     """Contacts._choose_slide; returns the velocity."""
     k = int(C[r])
     gx, gy, gz = ground_of(P, k, t)
-    if P[k, RESPONSE] == STICK:
-        return gx, gy, gz
+    if STICKY:
+        if P[k, RESPONSE] == STICK:
+            return gx, gy, gz
     nx, ny, nz = C[r + NORMAL], C[r + NORMAL + 1], C[r + NORMAL + 2]
     ux, uy, uz = vx - gx, vy - gy, vz - gz
     across = dot3(ux, uy, uz, nx, ny, nz)
@@ -177,9 +186,10 @@ def bear_one(P, C, r, friction, fx, fy, fz):
     nx, ny, nz = C[r + NORMAL], C[r + NORMAL + 1], C[r + NORMAL + 2]
     qx, qy, qz = fx - C[r + GIVEN], fy - C[r + GIVEN + 1], fz - C[r + GIVEN + 2]
     qx, qy, qz = qx - C[r + CARRIED], qy - C[r + CARRIED + 1], qz - C[r + CARRIED + 2]
-    if P[k, RESPONSE] == STICK:
-        C[r + HELD] = 1.0
-        return give(C, r, -qx, -qy, -qz, fx, fy, fz)
+    if STICKY:
+        if P[k, RESPONSE] == STICK:
+            C[r + HELD] = 1.0
+            return give(C, r, -qx, -qy, -qz, fx, fy, fz)
     into = dot3(qx, qy, qz, nx, ny, nz)
     load = -(into + C[r + BEND])
     if LAGGED:
@@ -258,7 +268,10 @@ def settle(P, C, o, t, h, x, y, z, vx, vy, vz, radius):
     for c in range(count):
         r = o + 1 + RECORD * c
         k = int(C[r])
-        if P[k, RESPONSE] != STICK and (ORDER == 1 or P[k, FRICTION] == 0):
+        holds = ORDER == 2 and P[k, FRICTION] != 0
+        if STICKY:
+            holds = holds or P[k, RESPONSE] == STICK
+        if not holds:
             continue
         px, py, pz = place_of(P, k, t)
         gx, gy, gz = ground_of(P, k, t)
@@ -325,7 +338,7 @@ def bounce(P, t, x, y, z, vx, vy, vz, radius):
     """
     hit = 0
     for k in range(len(P)):
-        if P[k, SWEPT] != 0 or ORDER == 1:
+        if P[k, SWEPT] != 0:
             continue
         px, py, pz = place_of(P, k, t)
         gap = gap_of(P, k, x - px, y - py, z - pz) - radius
@@ -334,7 +347,9 @@ def bounce(P, t, x, y, z, vx, vy, vz, radius):
         nx, ny, nz = normal_of(P, k, x - px, y - py, z - pz)
         gx, gy, gz = ground_of(P, k, t)
         if dot3(nx, ny, nz, vx - gx, vy - gy, vz - gz) < 0:
-            hit = max(hit, KILLED if P[k, RESPONSE] == KILL else 1)
+            hit = max(hit, 1)
+            if KILLS:
+                hit = KILLED if P[k, RESPONSE] == KILL else hit
             vx, vy, vz = respond(vx, vy, vz, nx, ny, nz, gx, gy, gz, P[k, RESTITUTION], P[k, FRICTION])
             sunk = gap if gap < 0 else 0.0
             x, y, z = x - sunk * nx, y - sunk * ny, z - sunk * nz
@@ -422,21 +437,20 @@ def chords_for(bend, eps):
 
 
 @njit(forceinline=True, **FLAGS)
-def first_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius):
+def curved_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius):
     """Fraction at which a path first meets surface k: swept.first_hit; infinite where it does not."""
-    if P[k, FLAT] != 0:
-        return flat_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius)
     start = distance(P, k, t0, x0, y0, z0) - radius
     end = distance(P, k, t0 + h, x1, y1, z1) - radius
     level = min(start, 0.0)
     moves = P[k, MOTION] != 0
     swing = 0.0
     way = reach_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h)
-    if moves:
-        px, py, pz = place_of(P, k, t0)
-        qx, qy, qz = place_of(P, k, t0 + h)
-        swing = swing_of(P, k, t0, h)
-        way = way + length3(qx - px, qy - py, qz - pz) + swing
+    if MOVING:
+        if moves:
+            px, py, pz = place_of(P, k, t0)
+            qx, qy, qz = place_of(P, k, t0 + h)
+            swing = swing_of(P, k, t0, h)
+            way = way + length3(qx - px, qy - py, qz - pz) + swing
     if not (start - level < way or end < level):
         return np.inf
     bend = bend_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h)
@@ -451,12 +465,13 @@ def first_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radiu
         high = np.inf
         if gap_of(P, k, bx, by, bz) - radius - level < 0:
             high = stop
-        elif P[k, BULGES] != 0:
-            enter = enters(P, k, ax, ay, az, bx, by, bz, radius, level)
-            if enter < np.inf:
-                leave = enters(P, k, bx, by, bz, ax, ay, az, radius, level)
-                if enter + leave < 1:
-                    high = low + 0.5 * (enter + (1 - leave)) * (stop - low)
+        elif BULGING:
+            if P[k, BULGES] != 0:
+                enter = enters(P, k, ax, ay, az, bx, by, bz, radius, level)
+                if enter < np.inf:
+                    leave = enters(P, k, bx, by, bz, ax, ay, az, radius, level)
+                    if enter + leave < 1:
+                        high = low + 0.5 * (enter + (1 - leave)) * (stop - low)
         if high < np.inf:
             lx, ly, lz = local_at(P, k, high, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h)
             g_high = gap_of(P, k, lx, ly, lz) - radius - level
@@ -473,7 +488,7 @@ def first_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radiu
 
 @njit(forceinline=True, **FLAGS)
 def flat_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius):
-    """first_hit for a flat surface at rest: swept._FlatApproach."""
+    """curved_hit for a flat surface at rest: swept._FlatApproach."""
     px, py, pz = place_of(P, k, t0)
     nx, ny, nz = normal_of(P, k, x0, y0, z0)
     start = gap_of(P, k, x0 - px, y0 - py, z0 - pz) - radius
@@ -565,7 +580,13 @@ def first_hits(P, C, o, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, r
         for c in range(count):
             stands = stands or C[o + 1 + RECORD * c] == k
         if not stands:
-            hit = first_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius)
+            hit = np.inf
+            if FLATS:
+                if P[k, FLAT] != 0:
+                    hit = flat_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius)
+            if CURVED:
+                if P[k, FLAT] == 0:
+                    hit = curved_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius)
             if hit < theta:
                 theta, which = hit, k
     return theta, which
@@ -600,7 +621,9 @@ def strike(P, C, o, alone, events, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w
         vx, vy, vz = velocity(s, h, x0, u0, x1, u1), velocity(s, h, y0, v0, y1, v1), velocity(s, h, z0, w0, z1, w1)
         now = t0 + s * h
         end = t0 + h
-        events += (1 + KILLED) if P[k, RESPONSE] == KILL else 1
+        events += 1
+        if KILLS:
+            events += KILLED if P[k, RESPONSE] == KILL else 0
         px, py, pz = place_of(P, k, now)
         nx, ny, nz = normal_of(P, k, x - px, y - py, z - pz)
         gx, gy, gz = ground_of(P, k, now)

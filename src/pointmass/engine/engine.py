@@ -434,7 +434,7 @@ class Engine:
         forces = self.system.forces
         return (
             kinds(forces),
-            tuple(self.system.colliders),
+            tuple((c, c.contact, c.response) for c in self.system.colliders),
             bool(self.system.particles.pinned.any()),
             all(f.enabled for f in forces),
         )

@@ -26,8 +26,8 @@ class Impacts:
     def __init__(
         self, contact: ContactText, order: int, loop: str, flags: str, call: str, w: str, m: str, radius: str
     ) -> None:
-        self.record, self.order, self.loop, self.flags, self.call = contact.record, order, loop, flags, call
-        self.row = ["g = base + i", f"o = {self.record} * i", "j = 3 * i", f"radius = np.float64({radius})"]
+        self.contact, self.order, self.loop, self.flags, self.call = contact, order, loop, flags, call
+        self.row = ["g = base + i", f"o = {contact.record} * i", "j = 3 * i", f"radius = np.float64({radius})"]
         self.w, self.m = w, m
         self.text = self._prepare() + self._collide()
 
@@ -73,7 +73,7 @@ class Impacts:
             *self.row,
             f"if {self.w} != 0:",
             f"    {now} = settle(F, K, o, end, h, {self._state('x', 'v')}, radius)",
-            f"    {now}, struck = bounce(F, end, {now}, radius)",
+            *[f"    {now}, struck = bounce(F, end, {now}, radius)"] * self.contact.discrete,
             *indented(planned, 1),
             f"    {now}, clock, e, gx, gy, gz = strike(",
             f"        F, K, o, alone, events[i], {self._state('x0', 'v0')}, {now}, t, h, radius",
@@ -82,9 +82,7 @@ class Impacts:
             "        hits += 1",
             f"        paid[i] = 1 if not alone and e <= {MOST_EVENTS} else 0",
             "        events[i] = e",
-            "    if struck > 0:",
-            "        hits += 1",
-            f"        events[i] += {KILLED} if struck == {KILLED} and not clock < end else 0",
+            *indented(self._bounced(), 1),
             "    if alone:",
             "        when[0] = clock",
             *indented([f"ground[j + {k}] = g{a}" for k, a in enumerate(XYZ)], 1),
@@ -116,6 +114,13 @@ class Impacts:
         arguments = "alone, t, h, x, v, events, paid, when, began, " + ", ".join(WORK)
         doc = '"""Let everybody respond to what is in the way; the clock to go on from, and how many hit."""'
         return function("collide", f"{self.call}, {arguments}", self.flags, [doc, *lines])
+
+    def _bounced(self) -> list[str]:
+        """What follows of the test at the end of a step."""
+        if not self.contact.discrete:
+            return []
+        death = [f"    events[i] += {KILLED} if struck == {KILLED} and not clock < end else 0"]
+        return ["if struck > 0:", "    hits += 1", *death * self.contact.kills]
 
     def _pay(self) -> list[str]:
         """ReferenceEngine._pay: what linked particles gained of the others' pull is taken off their rebound."""

@@ -131,6 +131,11 @@ class IslandKernel:
         return self.deriv.binder.attribute("w", "np.uintp(base + i)")
 
     @property
+    def deadly(self) -> bool:
+        """Whether a surface kills."""
+        return self.deriv.contact is not None and self.deriv.contact.kills
+
+    @property
     def work(self) -> list[str]:
         """Arrays that an island needs while it is advanced, each of length 3n."""
         more = [] if self.impacts is None else [*WORK, "av"]
@@ -295,7 +300,7 @@ class IslandKernel:
         for name in self.memory:
             call = call.replace(f", {name},", f", {name}_,")
         alive, dead, deaths = "", [], []
-        if self.impacts is not None:  # an island of more than one particle makes single steps where somebody may die
+        if self.deadly:  # an island of more than one particle makes single steps where somebody may die
             alive, dead = " and alive", ["alive = True"]
             deaths = ["for i in range(n):", f"    if events[i] >= {KILLED}:", "        died[base + i] = 1"]
             deaths.append("        alive = False")
@@ -326,7 +331,7 @@ class IslandKernel:
         ]
         layouts = [*self.step.arrays, "first_slice"] if kinds else []
         data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers), *layouts, *tiles.values()])
-        mortal = ["died"] * (self.impacts is not None)
+        mortal = ["died"] * self.deadly
         grid = ", ".join([*self.memory, "birth, t0, dt, k0, count, lengths, controls, work, status, reach", *mortal])
         given = f"lo, hi, first, x, v, {data}, {grid}"
         return entry_text(self.scratch, given, ["for island in range(lo, hi):", *indented(island, 1)])
@@ -468,7 +473,7 @@ class IslandMembers:
             work,
             status,
             reach,
-            *[died] * len(contact),
+            *[died] * self.kernel.deadly,
         )
         kernel = self.kernel.functions["run"]
         scratch = self.kernel.functions["scratch"]

@@ -307,7 +307,7 @@ class SinglesKernel:
             for k in range(3)
         ]
         begin = ["clock = max(clock, birth[lo + i])"] if self.births else []
-        mortal = island.deriv.contact is not None
+        mortal = island.deadly
         alive = " and died[lo + i] == 0" if mortal else ""
         death = [f"died[lo + i] = 1 if events[0] >= {KILLED} else 0"] if mortal else []
         # Most of the steps that somebody waited for are clear after all: only those that are not take the long way.
@@ -353,7 +353,7 @@ class SinglesKernel:
         if self.births:
             began += ["late = -np.inf", "for i in range(m):", "    late = max(late, birth[lo + i])"]
             hold = ["if late > t0 + k * dt:", "    for i in range(m):"]
-            dead = " or died[lo + i] != 0" if self.system.colliders else ""
+            dead = " or died[lo + i] != 0" if self.deadly else ""
             hold += [f"        s[{6 * W} + i] = R(1) if birth[lo + i] > t0 + k * dt{dead} else R(0)"]
         steps = [*hold, "stride = 1"]
         for u in unrolled:
@@ -363,7 +363,7 @@ class SinglesKernel:
         steps = ["while k < k0 + count:", *indented([*steps, *caught, "k += stride"], 1)]
         arrays = [*motion.binder.arrays, *(["F"] if self.system.colliders else [])]
         given = f"first, last, x, v, x_kept, v_kept, {', '.join(arrays)}, birth, t0, dt, k0, count, status, reach"
-        given += ", died" if self.system.colliders else ""
+        given += ", died" if self.deadly else ""
         made = [f"s = np.ones({(STATE + columns) * W}, R)", *prepared]
         own = [f"    s[{(STATE + c) * W} + i] = C[{c}, lo + i]" for c in range(columns)]
         tile = [
@@ -383,6 +383,11 @@ class SinglesKernel:
             *(f"keep(s, {offset}, {q}, lo, m)" for q, offset in copies),
         ]
         return entry_text(made, given, ["for tile in range(first, last):", *indented(tile, 1)])
+
+    @property
+    def deadly(self) -> bool:
+        """Whether a surface kills."""
+        return self.island is not None and self.island.deadly
 
     @property
     def shared(self) -> list[str]:
@@ -435,8 +440,7 @@ class SingleMembers:
         grid = (span.t0, span.dt, span.first, span.count)
         kernel, scratch = self.kernel.functions["run"], self.kernel.functions["scratch"]
         died = np.zeros(count, np.uint8)
-        mortal = [died] if self.kernel.system.colliders else []
-        arrays = (x, v, *kept, *data, *grid, status, reach, *mortal)
+        arrays = (x, v, *kept, *data, *grid, status, reach, *[died] * self.kernel.deadly)
         spread(lambda lo, hi: kernel(lo, hi, *arrays, *scratch([1])), tiles, GRAIN)
         work = Stats(span.count, 0, span.count * motion.evaluations)
         far = reach.max(axis=0).astype(np.float64)
