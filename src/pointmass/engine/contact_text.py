@@ -45,9 +45,8 @@ def distance(P, k, t, x, y, z):
 def near(P, t, x, y, z, radius):
     """Whether a particle is within reach of a surface: if so, `find` wants to know its acceleration."""
     for k in range(len(P)):
-        if KILLS:
-            if P[k, RESPONSE] == KILL:
-                continue
+        if KILLS and P[k, RESPONSE] == KILL:
+            continue
         if distance(P, k, t, x, y, z) - radius <= P[k, NEAR]:
             return True
     return False
@@ -61,9 +60,8 @@ def find(P, C, o, t, x, y, z, vx, vy, vz, m, ax, ay, az, radius):
         px, py, pz = place_of(P, k, t)
         lx, ly, lz = x - px, y - py, z - pz
         gap = gap_of(P, k, lx, ly, lz) - radius
-        if KILLS:
-            if P[k, RESPONSE] == KILL:
-                continue
+        if KILLS and P[k, RESPONSE] == KILL:
+            continue
         if not gap <= P[k, NEAR]:
             continue
         nx, ny, nz = normal_of(P, k, lx, ly, lz)
@@ -115,9 +113,8 @@ def choose_slide(P, C, r, t, vx, vy, vz, m, ax, ay, az):
     """Contacts._choose_slide; returns the velocity."""
     k = int(C[r])
     gx, gy, gz = ground_of(P, k, t)
-    if STICKY:
-        if P[k, RESPONSE] == STICK:
-            return gx, gy, gz
+    if STICKY and P[k, RESPONSE] == STICK:
+        return gx, gy, gz
     nx, ny, nz = C[r + NORMAL], C[r + NORMAL + 1], C[r + NORMAL + 2]
     ux, uy, uz = vx - gx, vy - gy, vz - gz
     across = dot3(ux, uy, uz, nx, ny, nz)
@@ -186,10 +183,9 @@ def bear_one(P, C, r, friction, fx, fy, fz):
     nx, ny, nz = C[r + NORMAL], C[r + NORMAL + 1], C[r + NORMAL + 2]
     qx, qy, qz = fx - C[r + GIVEN], fy - C[r + GIVEN + 1], fz - C[r + GIVEN + 2]
     qx, qy, qz = qx - C[r + CARRIED], qy - C[r + CARRIED + 1], qz - C[r + CARRIED + 2]
-    if STICKY:
-        if P[k, RESPONSE] == STICK:
-            C[r + HELD] = 1.0
-            return give(C, r, -qx, -qy, -qz, fx, fy, fz)
+    if STICKY and P[k, RESPONSE] == STICK:
+        C[r + HELD] = 1.0
+        return give(C, r, -qx, -qy, -qz, fx, fy, fz)
     into = dot3(qx, qy, qz, nx, ny, nz)
     load = -(into + C[r + BEND])
     if LAGGED:
@@ -445,12 +441,11 @@ def curved_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radi
     moves = P[k, MOTION] != 0
     swing = 0.0
     way = reach_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h)
-    if MOVING:
-        if moves:
-            px, py, pz = place_of(P, k, t0)
-            qx, qy, qz = place_of(P, k, t0 + h)
-            swing = swing_of(P, k, t0, h)
-            way = way + length3(qx - px, qy - py, qz - pz) + swing
+    if MOVING and moves:
+        px, py, pz = place_of(P, k, t0)
+        qx, qy, qz = place_of(P, k, t0 + h)
+        swing = swing_of(P, k, t0, h)
+        way = way + length3(qx - px, qy - py, qz - pz) + swing
     if not (start - level < way or end < level):
         return np.inf
     bend = bend_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h)
@@ -465,13 +460,12 @@ def curved_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radi
         high = np.inf
         if gap_of(P, k, bx, by, bz) - radius - level < 0:
             high = stop
-        elif BULGING:
-            if P[k, BULGES] != 0:
-                enter = enters(P, k, ax, ay, az, bx, by, bz, radius, level)
-                if enter < np.inf:
-                    leave = enters(P, k, bx, by, bz, ax, ay, az, radius, level)
-                    if enter + leave < 1:
-                        high = low + 0.5 * (enter + (1 - leave)) * (stop - low)
+        elif BULGING and P[k, BULGES] != 0:
+            enter = enters(P, k, ax, ay, az, bx, by, bz, radius, level)
+            if enter < np.inf:
+                leave = enters(P, k, bx, by, bz, ax, ay, az, radius, level)
+                if enter + leave < 1:
+                    high = low + 0.5 * (enter + (1 - leave)) * (stop - low)
         if high < np.inf:
             lx, ly, lz = local_at(P, k, high, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h)
             g_high = gap_of(P, k, lx, ly, lz) - radius - level
@@ -581,12 +575,10 @@ def first_hits(P, C, o, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, r
             stands = stands or C[o + 1 + RECORD * c] == k
         if not stands:
             hit = np.inf
-            if FLATS:
-                if P[k, FLAT] != 0:
-                    hit = flat_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius)
-            if CURVED:
-                if P[k, FLAT] == 0:
-                    hit = curved_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius)
+            if FLATS and P[k, FLAT] != 0:
+                hit = flat_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius)
+            if CURVED and P[k, FLAT] == 0:
+                hit = curved_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius)
             if hit < theta:
                 theta, which = hit, k
     return theta, which

@@ -6,6 +6,7 @@ once, so that memory is touched once a frame. Tiles are always padded to full wi
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -231,10 +232,10 @@ class SinglesKernel:
         timed = motion.timed or (clear is not None and bool(clear.step))
         long = timed or len(step) > LONG or bool(motion.binder.functions)  # functions are longer than they look
         unrolled = [u for u in UNROLLED if u == 1 or not long]
-        lanes = [self._lanes(u, step, clear) for u in unrolled]
+        lanes = [self._unrolled(u, step, clear) for u in unrolled if u > 1]
         first = motion.binder.functions if island is None else island.functions_text
-        one = [] if island is None else [WAITS, *self._one_lane(step, clear)]
-        return "".join([REACHED, first, TRANSPOSED, *lanes, *one, self._run(unrolled)])
+        waits = "" if island is None else WAITS
+        return "".join([REACHED, first, TRANSPOSED, *lanes, self._single(step, clear), waits, self._run(unrolled)])
 
     def _clear(self) -> ClearLines | None:
         contact = None if self.island is None else self.island.deriv.contact
@@ -248,18 +249,27 @@ class SinglesKernel:
                 lines.append(f"{b}{end} = {f'{q}{tail}_{a}' if (q, a) in self.state else 'R(0)'}")
         return lines
 
-    def _lanes(self, unrolled: int, step: list[str], clear: ClearLines | None) -> str:
+    def _unrolled(self, count: int, step: list[str], clear: ClearLines | None) -> str:
         """The function that makes a few steps of all lanes, with the state in registers in between."""
-        arguments = ", ".join([*self.shared, *(f"t{j}" for j in range(unrolled + 1))])
-        loop = [f"for j in range({W}):", *indented([f"{LANE} = np.uintp(j)", *self._lane(unrolled, step, clear)], 1)]
-        lines = [*self._head(unrolled, clear), *loop, "return status"]
-        return function(f"lanes{unrolled}", arguments, "**FLAGS", lines)
+        arguments = ", ".join([*self.shared, *(f"t{j}" for j in range(count + 1))])
+        loop = [f"for j in range({W}):", *indented([f"{LANE} = np.uintp(j)", *self._lane(count, step, clear)], 1)]
+        lines = [*self._head(count, clear), *loop, "return status"]
+        return function(f"lanes{count}", arguments, "**FLAGS", lines)
 
-    def _one_lane(self, step: list[str], clear: ClearLines | None) -> str:
-        """The function that makes one step of one lane, and says whether that was clear."""
-        lines = [*self._head(1, clear), *self._lane(1, step, clear), "return not waits and status == 0"]
-        arguments = ", ".join([LANE, *self.shared, "t0", "t1"])
-        return function("lane", arguments, "forceinline=True, **FLAGS", lines)
+    def _single(self, step: list[str], clear: ClearLines | None) -> str:
+        """The functions that make one step of all lanes, and of one lane; this says whether that was clear."""
+        head, body = self._head(1, clear), self._lane(1, step, clear)
+        common = ", ".join(_read([*self.shared, *_assigned(head)], body))
+        last = "return not waits" if self.island is not None else "return True"
+        step_of = function("step_of", f"{LANE}, {common}", "forceinline=True, **FLAGS", [*body, last])
+        call = f"step_of({{}}, {common})"
+        arguments = ", ".join([*self.shared, "t0", "t1"])
+        all_lanes = [*head, f"for j in range({W}):", f"    {call.format('np.uintp(j)')}", "return status"]
+        texts = [step_of, function("lanes1", arguments, "**FLAGS", all_lanes)]
+        if self.island is not None:
+            one = [*head, f"return {call.format(LANE)} and status == 0"]
+            texts.append(function("lane", f"{LANE}, {arguments}", "**FLAGS", one))
+        return "".join(texts)
 
     def _head(self, unrolled: int, clear: ClearLines | None) -> list[str]:
         """What all lanes have in common."""
@@ -409,6 +419,18 @@ class SinglesKernel:
     def members(self, rows: Rows, labels: Rows) -> SingleMembers:
         """Particles to be advanced: see `SingleMembers`."""
         return SingleMembers(self, rows)
+
+
+def _assigned(lines: list[str]) -> list[str]:
+    """Names of the locals that statements assign, but those of blocks."""
+    targets = (line.split(" = ")[0].split(", ") for line in lines if " = " in line and not line.startswith(" "))
+    return list(dict.fromkeys(name for names in targets for name in names))
+
+
+def _read(names: list[str], lines: list[str]) -> list[str]:
+    """Those of the names that statements read."""
+    words = set(re.findall(r"[A-Za-z_]\w*", " ".join(lines)))
+    return [name for name in names if name in words]
 
 
 @dataclass(eq=False)

@@ -32,11 +32,12 @@ Printed by pointmass {version} for {dtype}. It runs without Numba too: delete th
 import numpy as np
 from numba import njit, prange
 
+from pointmass.engine.inner import Inner
 from pointmass.engine.support import added, columns, exponent, mixed, scaled, select, significand, subtracted
 
 R = np.{dtype}
 OWNING = {{"_nrt": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True{fast}}}
-FLAGS = {{**OWNING, "_nrt": False}}  # of what makes no arrays: nobody counts references to those that it is given
+FLAGS = {{**OWNING, "_nrt": False, "pipeline_class": Inner}}  # of what makes no arrays: nobody counts references
 ENTRY = {{"_nrt": False, "error_model": "numpy", "cache": True, "nogil": True{fast}}}  # of what Python calls
 OWNING_ENTRY = {{**ENTRY, "_nrt": True}}
 
