@@ -210,6 +210,11 @@ def smoke():
     save("smoke", *of_page("smoke"))
 
 
+def splashes():
+    """Rain of docs/scenes.md."""
+    save("splashes", *of_page("splashes"))
+
+
 def snow():
     """Flakes of docs/scenes.md."""
     save("snow", *of_page("snow"))
@@ -283,6 +288,7 @@ PICTURES = (
     coin,
     sparks,
     smoke,
+    splashes,
     snow,
     curl_noise,
     pendulum,

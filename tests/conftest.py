@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import settings
+
+from pointmass.engine import store
 
 # Most tests make small systems of many kinds: to compile each would take hours. Those of the engine ask for it.
 os.environ.setdefault("POINTMASS_ENGINE", "reference")
@@ -26,3 +29,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         for item in items:
             if "full" in item.keywords:
                 item.add_marker(pytest.mark.skip(reason="needs --full"))
+
+
+@pytest.fixture
+def plain(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kernels run as plain Python, so that every combination can be tried without compiling it."""
+    monkeypatch.setattr(store, "load", lambda *text: SimpleNamespace(**store.plain(*text)))

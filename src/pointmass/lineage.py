@@ -13,11 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pointmass.collisions.impacts import NO_IMPACTS, Impacts
 from pointmass.collisions.swept import Paths
 from pointmass.emitters.emitter import Array, Birth, Emitter, Parents
 from pointmass.engine.engine import Engine
 from pointmass.engine.island import Span
 from pointmass.errors import InvalidInput, unknown
+from pointmass.zones import Zone, killed
 
 Rows = NDArray[np.intp]
 
@@ -61,8 +63,8 @@ class Lineage:
         An emitter follows one that does not exist, or itself by whatever detours; two have one name.
     """
 
-    def __init__(self, emitters: Sequence[Emitter]) -> None:
-        self.emitters = emitters
+    def __init__(self, emitters: Sequence[Emitter], zones: Sequence[Zone] = ()) -> None:
+        self.emitters, self.zones = emitters, zones
         named = [e.name for e in emitters if e.name]
         for name in named:
             if named.count(name) > 1:
@@ -89,6 +91,10 @@ class Lineage:
             for births in born:
                 self.kin[k] = self.kin[k].joined(_kin(k, births[k]))
             self.kin[k] = self.kin[k].take(self.kin[k].death > t)
+
+    def forget(self, gone: dict[int, NDArray[np.bool_]]) -> None:
+        """Forget those of each emitter that a mask marks."""
+        self.kin = {k: kin.take(~gone[k]) for k, kin in self.kin.items()}
 
     def foresee(
         self, engine: Engine, span: Span, born: list[list[Birth]], compiled: bool, seed: int, streams: Sequence[str]
@@ -123,6 +129,16 @@ class Lineage:
         return born
 
 
+@dataclass(frozen=True, eq=False)
+class _Met:
+    """Where all particles come in a step, shape (n, 3), and what they meet on their way."""
+
+    x: Array
+    v: Array
+    died: Rows
+    impacts: Impacts
+
+
 class _Rehearsal:
     """Parents on their way through a span."""
 
@@ -130,60 +146,78 @@ class _Rehearsal:
         self.lineage, self.engine, self.span, self.compiled = lineage, engine, span, compiled
         self.system = engine.system
         self.rows = {k: self.system.particles.rows(kin.ids) for k, kin in lineage.kin.items()}
-        self.kin = {k: kin.take(self.rows[k] >= 0) for k, kin in lineage.kin.items()}  # nobody whom a hand took away
+        lineage.forget({k: rows < 0 for k, rows in self.rows.items()})  # whom a hand, a zone or a surface took away
+        self.kin = dict(lineage.kin)
         self.rows = {k: rows[rows >= 0] for k, rows in self.rows.items()}
-        self.ends: tuple[Array, Array] | None = None  # of everybody, where particles act on each other
+        self.perilous = engine.deadly or bool(lineage.zones)
+        self.met: _Met | None = None  # by everybody, where particles act on each other
 
     def begin(self, step: Span) -> None:
         """Find where those who are joined to others will be at the end of a step."""
         if self.engine.coupled:
             p = self.system.particles
             with self.engine.rehearsal():
-                self.engine.ahead(np.arange(len(p)), step, np.full(len(p), step.start), self.compiled)
-                self.ends = p.x.copy(), p.v.copy()
+                met = self._ahead(np.arange(len(p)), np.full(len(p), step.start), step)
+                self.met = replace(met, x=met.x.copy(), v=met.v.copy())
 
     def stretch(self, k: int, newborn: Birth, step: Span) -> Parents:
         """The particles of an emitter in a step, which is the next one for them."""
-        p, count = self.system.particles, len(self.rows[k])
-        kin = self.kin[k].joined(_kin(k, newborn))
+        p, alive = self.system.particles, self.kin[k].death > step.start
+        old, rows = self.kin[k].take(alive), self.rows[k][alive]
+        kin, count = old.joined(_kin(k, newborn)), len(rows)
         clock = np.maximum(kin.birth, step.start)
-        x0 = np.concatenate([p.x[self.rows[k]], newborn.x]).astype(np.float64)
-        v0 = np.concatenate([p.v[self.rows[k]], newborn.v]).astype(np.float64)
+        x0 = np.concatenate([p.x[rows], newborn.x]).astype(np.float64)
+        v0 = np.concatenate([p.v[rows], newborn.v]).astype(np.float64)
         still = Paths(x0, v0, x0, v0, clock, step.end - clock, np.zeros(len(clock)))
-        parents = Parents(kin.ids, kin.birth, kin.death, np.arange(len(clock)) >= count, still)
+        parents = Parents(kin.ids, kin.birth, kin.death, np.arange(len(clock)) >= count, still, NO_IMPACTS, step.first)
         awaited = np.zeros(len(clock), bool)
         for follower in self.lineage.followed[k]:
-            awaited |= self.lineage.emitters[follower].awaits(parents, self.span.end)
-        rows = np.append(self.rows[k], self._added(newborn, kin.ids[count:], awaited[count:]))
-        paths = self._paths(rows, awaited, still, step)
-        self.kin[k], self.rows[k] = kin.take(rows >= 0), rows[rows >= 0]
-        return replace(parents, paths=paths).take(kin.death > step.start)
+            awaited |= self.lineage.emitters[follower].awaits(parents, self.span.end, self.perilous)
+        rows = np.append(rows, self._added(newborn, kin.ids[count:], awaited[count:]))
+        parents = self._gone(parents, rows, awaited, step)
+        self.kin[k] = replace(kin, death=parents.death).take(rows >= 0)
+        self.rows[k] = rows[rows >= 0]
+        return parents
 
     def _added(self, newborn: Birth, ids: NDArray[np.int64], awaited: NDArray[np.bool_]) -> Rows:
         """Rows of the newborn, -1 for those who need not go along."""
         rows = np.full(len(awaited), -1)
-        if self.ends is None and awaited.any():
+        if self.met is None and awaited.any():
             rows[awaited] = len(self.system.particles) + np.arange(int(awaited.sum()))
             columns = {name: np.broadcast_to(c, len(awaited))[awaited] for name, c in newborn.columns.items()}
             lifetime = newborn.lifetime[awaited]
             self.system.add(newborn.x[awaited], newborn.v[awaited], lifetime=lifetime, id=ids[awaited], **columns)
         return rows
 
-    def _paths(self, rows: Rows, awaited: NDArray[np.bool_], still: Paths, step: Span) -> Paths:
-        """The ways of those who are awaited. Where particles act on each other, the newborn go straight."""
-        p, goes = self.system.particles, awaited & (rows >= 0)
+    def _gone(self, parents: Parents, rows: Rows, awaited: NDArray[np.bool_], step: Span) -> Parents:
+        """Parents who have gone their ways, those that are awaited. Where particles act on each other, the newborn go
+        straight, and meet nothing."""
+        p, still, goes = self.system.particles, parents.paths, awaited & (rows >= 0)
         x0, v0 = still.x0, still.v0
         x1, v1 = x0 + still.h[:, None] * v0, v0.copy()
-        if self.ends is not None:
-            x1[goes], v1[goes] = self.ends[0][rows[goes]], self.ends[1][rows[goes]]
-        elif goes.any():
+        met, impacts, dead = self.met, NO_IMPACTS, np.zeros(len(rows), bool)
+        if met is None and goes.any():
             births = np.full(len(p), step.start)
             births[rows[goes]] = still.t0[goes]
-            self.engine.ahead(np.sort(rows[goes]), step, births, self.compiled)
-            x1[goes], v1[goes] = p.x[rows[goes]], p.v[rows[goes]]
+            met = self._ahead(np.sort(rows[goes]), births, step)
+        if met is not None:
+            x1[goes], v1[goes] = met.x[rows[goes]], met.v[rows[goes]]
+            dead[goes] = np.isin(rows[goes], met.died)
+            dead |= goes & killed(self.lineage.zones, x1, step.end, still.t0 < step.end)
+            whose = np.full(len(p), -1)
+            whose[rows[goes]] = np.flatnonzero(goes)
+            mine = met.impacts.take(whose[met.impacts.rows] >= 0)
+            impacts = Impacts.of([replace(mine, rows=whose[mine.rows])])
         if self.system.order == 1:
             v0 = v1 = (x1 - x0) / np.where(still.h > 0, still.h, 1)[:, None]
-        return replace(still, v0=v0, x1=x1, v1=v1)
+        death = np.where(dead, np.minimum(parents.death, step.end), parents.death)
+        return replace(parents, death=death, paths=replace(still, v0=v0, x1=x1, v1=v1), impacts=impacts)
+
+    def _ahead(self, rows: Rows, births: Array, step: Span) -> _Met:
+        """Take some particles over a step."""
+        p, engine = self.system.particles, self.engine
+        engine.ahead(rows, step, births, self.compiled)
+        return _Met(p.x, p.v, engine.died, engine.impacts)
 
 
 def _kin(emitter: int, births: Birth) -> Kin:

@@ -118,7 +118,7 @@ FLOW_OR_VECTOR = "Vector | VelocityField"
 SOLIDS = "Sequence[Solid]"
 SHORT = {
     "Contact": "Literal['swept', 'discrete']",
-    "Event": "Literal['death', 'birth', 'trail']",
+    "Event": "Literal['death', 'birth', 'impact', 'trail']",
     "Where": "Literal['surface', 'volume']",
     "Response": "Literal['bounce', 'stick', 'slide', 'kill']",
 }

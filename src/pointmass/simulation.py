@@ -24,7 +24,7 @@ from pointmass.solvers.advance import advance
 from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.control import control_of
 from pointmass.system import ParticleSystem
-from pointmass.zones import WHEN_FULL, WhenFull, Zone, oldest, with_room
+from pointmass.zones import WHEN_FULL, WhenFull, Zone, killed, oldest, with_room
 
 Born = list[list[Birth]]  # for each step, of each emitter
 
@@ -113,10 +113,11 @@ class Simulation:
         self.t0 = system.t
         self.steps = 0
         self.frames_seen = 0
-        self.engine = Engine(system, self.solver, compiled_by_default() if compiled is None else compiled)
+        wanted = compiled_by_default() if compiled is None else compiled
+        self.engine = Engine(system, self.solver, wanted, watched=any(e.at_impacts for e in self.emitters))
         for reason in self.engine.missing() if self.engine.wanted else ():
             warnings.warn(f"this run is not compiled, because {reason}", stacklevel=2)
-        self._lineage = Lineage(self.emitters)
+        self._lineage = Lineage(self.emitters, self.zones)
         self._start = system.get_state()
         self._stage = Stage(self.look, system.particles.x)
         self._looks = self.t0, 0, 1.0  # time of a frame, how many were looked at from it on, and how many in a second
@@ -350,8 +351,7 @@ class Simulation:
         gone[rows[rows >= 0]] = True
         gone[self.engine.died] = True
         self._mortal, self._death = self._mortal[~dead], self._death[~dead]
-        for zone in self.zones:
-            gone |= zone.kills(p.x, t1)
+        gone |= killed(self.zones, p.x, t1, p.age > 0)
         if gone.any():
             self.system.remove(gone)
         if self.max_particles is not None and len(p) > self.max_particles:

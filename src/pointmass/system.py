@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -281,6 +282,18 @@ class ParticleSystem:
         for force in self.forces:
             force.keep(self.particles, mask)
         self.particles.keep(mask)
+
+    def part(self, rows: NDArray[np.intp]) -> ParticleSystem:
+        """A system of some of the particles under the same laws; this one stays as it is."""
+        mask = np.zeros(len(self.particles), bool)
+        mask[rows] = True
+        result = copy(self)
+        result.particles, result.forces = copy(self.particles), [force.twin() for force in self.forces]
+        result.filter = result._islands = None
+        for force in result.forces:
+            force.keep(self.particles, mask)
+        result.particles.keep(mask)
+        return result
 
     # ---------------------------------------------------------------------------------------- inside
 

@@ -22,6 +22,8 @@ WHEN_FULL: tuple[WhenFull, ...] = ("no birth", "oldest dies")
 class Zone(Described):
     """Where particles die: those whose centre is in it at the end of a step are taken away.
 
+    Who is born at that very moment, such as the children of those who die in the zone, has another step to leave it.
+
     Parameters
     ----------
     shape : of the zone: who is at a negative distance from it dies.
@@ -34,6 +36,14 @@ class Zone(Described):
         """Which of the points, shape (k, 3), are in the zone at time t, shape (k,)."""
         inside: NDArray[np.bool_] = np.any([surface.distance(x, t) < 0 for surface in self.shape.surfaces], axis=0)
         return inside
+
+
+def killed(zones: Sequence[Zone], x: Array, t: float, born_before: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Who dies in a zone at time t, shape (k,): those who were born before. Who is born there may leave first."""
+    inside = np.zeros(len(x), bool)
+    for zone in zones:
+        inside |= zone.kills(x, t)
+    return inside & born_before
 
 
 class SphereZone(Zone):

@@ -1,17 +1,8 @@
-"""Engines whose kernels run as plain Python, so that every combination can be tried without compiling it."""
+"""Where the kernels of these tests are kept."""
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import pytest
-
-from pointmass.engine import store
-
-
-@pytest.fixture
-def plain(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(store, "load", lambda *text: SimpleNamespace(**store.plain(*text)))
 
 
 @pytest.fixture(scope="session", autouse=True)

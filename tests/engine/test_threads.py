@@ -49,6 +49,14 @@ system = pm.ParticleSystem(particles, [pm.Gravity(), pm.Springs(pairs, 5.0, rest
 sim = pm.Simulation(system, pm.ImplicitEuler(newton="one", cg_tolerance=1e-3), 1 / 60, compiled=True)
 sim.step(3)
 hash.update(particles.x.tobytes())
+
+rain = pm.BoxEmitter((0, 0.5, 0), name="rain", sides=(9, 0, 9), rate=9000, speed=4, direction=(0, -1, 0), lifetime=1)
+splash = pm.PointEmitter(of="rain", on="impact", count=3, speed=2, cone=60, lifetime=1)
+system = pm.ParticleSystem(pm.Particles(np.zeros((0, 3))), [pm.Gravity()], [pm.Plane(restitution=0.3)])
+sim = pm.Simulation(system, "leapfrog", 1 / 60, emitters=[rain, splash], compiled=True)
+sim.step(24)
+assert len(system.particles) > 9000
+hash.update(system.particles.id.tobytes() + system.particles.x.tobytes())
 print(hash.hexdigest())
 """
 

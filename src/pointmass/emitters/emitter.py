@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pointmass.collisions.impacts import Impacts
 from pointmass.collisions.swept import Paths
 from pointmass.description import Described
 
@@ -68,9 +69,11 @@ class Parents:
     Attributes
     ----------
     ids : shape (k,).
-    birth, death : of each [s], shape (k,).
+    birth, death : of each [s], shape (k,); a death before its time, by a surface or in a zone, is at the end.
     newborn : whether each was born in this stretch, shape (k,).
     paths : of each, from the beginning of the stretch, or its birth if that is later, to the end.
+    impacts : on surfaces; their rows are those of the parents.
+    step : number of the stretch.
     """
 
     ids: NDArray[np.int64]
@@ -78,10 +81,8 @@ class Parents:
     death: Array
     newborn: NDArray[np.bool_]
     paths: Paths
-
-    def take(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Parents:
-        """Some of them."""
-        return Parents(self.ids[rows], self.birth[rows], self.death[rows], self.newborn[rows], self.paths.take(rows))
+    impacts: Impacts
+    step: int
 
 
 class Emitter(Described, ABC):
@@ -92,11 +93,13 @@ class Emitter(Described, ABC):
     name : by which others can follow it.
     of : name of the emitter whose particles it follows, "" if it follows nobody.
     attributes_made : names of the particle attributes that it sets.
+    at_impacts : whether particles that it follows have children where they hit surfaces.
     """
 
     name: str = ""
     of: str = ""
     attributes_made: tuple[str, ...] = ()
+    at_impacts: bool = False
 
     @abstractmethod
     def births(self, t0: float, t1: float, seed: int, stream: str) -> Birth:
@@ -112,6 +115,11 @@ class Emitter(Described, ABC):
         """The particles that parents have in a step from t0 to t1, for an emitter that follows others."""
         return NOBODY
 
-    def awaits(self, parents: Parents, t1: float) -> NDArray[np.bool_]:
-        """Of which parents it needs the paths until t1, shape (k,)."""
+    def awaits(self, parents: Parents, t1: float, perilous: bool) -> NDArray[np.bool_]:
+        """Of which parents it needs the paths until t1, shape (k,).
+
+        Parameters
+        ----------
+        perilous : whether parents may die before their time.
+        """
         return np.zeros(len(parents.ids), bool)

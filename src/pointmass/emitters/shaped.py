@@ -9,7 +9,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ SPEED = Spread(5.0, 0.5)
 
 Axis = Vector | str
 Rate = float | str | Callable[[Any], Any]
-Event = Literal["birth", "death", "trail"]
+Event = Literal["birth", "death", "impact", "trail"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,8 @@ class ShapedEmitter(Emitter):
     Parameters
     ----------
     position : of the shape [m]: three numbers, or formulas or a function of t. Relative to the parent, with `of`.
-    direction : axis of the cone of directions, or "normal": the shape's own normal at each place.
+    direction : axis of the cone of directions, or "normal": the shape's own normal at each place, or with on = "impact"
+        that of the surface which was hit.
     rate : births per second [1/s], at most 1e9: a number, or a formula or function of t; births are then equally far
         apart in its integral. 100 by default, if nothing else makes particles.
     per_distance : births per metre of the path of the position [1/m].
@@ -85,9 +86,12 @@ class ShapedEmitter(Emitter):
     attributes : further columns of particles by name, such as { temperature = 900 }.
     name : by which other emitters can follow this one.
     of : name of the emitter whose particles have these as children.
-    on : "death", "birth", or "trail": all along the path of each parent, where rate, bursts, start and stop go by the
-        age of the parent instead of t.
-    count : children of each parent at its death or birth; a mean is rounded up or down by chance. 100 by default.
+    on : "death", also that by a surface or in a zone; "birth"; "impact": whenever a parent hits a surface, with its
+        velocity after that; or "trail": all along the path of each parent, where rate, bursts, start and stop go by
+        the age of the parent instead of t.
+    count : children of each parent at its death or birth, or of each of its impacts; a mean is rounded up or down by
+        chance. 100 by default.
+    above : speed into the surface, along its normal, from which on an impact makes children [m/s], at least 0.
     """
 
     position: Vector = (0.0, 0.0, 0.0)
@@ -109,6 +113,7 @@ class ShapedEmitter(Emitter):
     of: str = ""
     on: Event = "death"
     count: Chance | None = None
+    above: float = 0.0
 
     def __post_init__(self) -> None:
         self._motion = Motion(self.position, "position")
@@ -128,6 +133,8 @@ class ShapedEmitter(Emitter):
         } | {name: Quantity(f"attributes.{name}", value) for name, value in given.items()}
         self.attributes_made = tuple(given)
         self._check_event()
+        self.at_impacts = self.on == "impact"
+        number("above", self.above, at_least=0, unit="m/s")
         self._schedules = self._made_schedules()
         self._count = Quantity("count", 100 if self.count is None else self.count, at_least=0, at_most=1e9)
         self._kept: dict[int, tuple[Any, Draws]] = {}
@@ -169,9 +176,11 @@ class ShapedEmitter(Emitter):
             self._kept[which] = key, self._draw(which * MOST + np.arange(lo, hi), seed, stream)
         return self._kept[which][1].take(slice(first - lo, end - lo))
 
-    def _draw(self, ids: NDArray[np.int64], seed: int, stream: str) -> Draws:
+    def _draw(self, ids: NDArray[np.int64], seed: int, stream: str, normals: Array | None = None) -> Draws:
+        """Draws for births of some ids, where surfaces have these normals."""
         u = [random.uniform(seed, stream, ids, purpose) for purpose in ("place", "place 2")]
-        place, normal = self.spot(np.concatenate(u, axis=1))
+        place, own = self.spot(np.concatenate(u, axis=1))
+        normal = own if normals is None else normals
         axis = normal if self._axis is None else np.broadcast_to(self._axis, place.shape)
         way = _within_cone(axis, self._edge, random.uniform(seed, stream, ids, "direction"))
         speed = self._speed.draw(seed, stream, ids)
@@ -180,12 +189,14 @@ class ShapedEmitter(Emitter):
 
     # ------------------------------------------------------------------------------------------------ with parents
 
-    def awaits(self, parents: Parents, t1: float) -> NDArray[np.bool_]:
-        if self.on == "death":
+    def awaits(self, parents: Parents, t1: float, perilous: bool) -> NDArray[np.bool_]:
+        if self.on == "death" and not perilous:
             return parents.death <= t1
-        return np.full(len(parents.ids), self.on == "trail")
+        return np.full(len(parents.ids), self.on != "birth")
 
     def offspring(self, parents: Parents, t0: float, t1: float, seed: int, stream: str) -> Birth:
+        if self.on == "impact":
+            return self._splashes(parents, seed, stream)
         parts = [part for part in self._events(parents, t0, t1, seed, stream) if len(part[0])]
         if not parts:
             return NOBODY
@@ -196,6 +207,20 @@ class ShapedEmitter(Emitter):
         x = path.position(theta) + self._motion.place(time) + draws.place
         v = draws.velocity + self._inherited * (path.velocity(theta) + self._motion.velocity(time))
         return Birth(time, ids, x, v, draws.lifetime, draws.columns)
+
+    def _splashes(self, parents: Parents, seed: int, stream: str) -> Birth:
+        """The children of impacts, at most as late as their parents' deaths."""
+        turns, impacts = parents.impacts.turn, parents.impacts
+        ids = random.hashed(seed, f"{stream} step", parents.ids[impacts.rows], parents.step)
+        ids = random.hashed(seed, f"{stream} impact", ids, turns)
+        rows = np.flatnonzero((impacts.speed >= self.above) & (impacts.time <= parents.death[impacts.rows]))
+        counts = self._count.whole(seed, stream, ids[rows])
+        which, child = _children(rows, np.zeros(len(rows), np.int64), counts)
+        ids, hit = random.hashed(seed, stream, ids[which], child), impacts.take(which)
+        draws = self._draw(ids, seed, stream, hit.normal)
+        x = hit.x + self._motion.place(hit.time) + draws.place
+        v = draws.velocity + self._inherited * (hit.v + self._motion.velocity(hit.time))
+        return Birth(hit.time, ids, x, v, draws.lifetime, draws.columns)
 
     def _events(
         self, parents: Parents, t0: float, t1: float, seed: int, stream: str
@@ -220,17 +245,19 @@ class ShapedEmitter(Emitter):
 
     def _check_event(self) -> None:
         """Refuse what means nothing for the event that makes the particles."""
-        if self.on not in ("death", "birth", "trail"):
-            raise unknown("value of on:", self.on, ("death", "birth", "trail"))
+        if self.on not in get_args(Event):
+            raise unknown("value of on:", self.on, get_args(Event))
         for what in ("name", "of"):
             if not isinstance(getattr(self, what), str):
                 raise InvalidInput(f"{what} must be the name of an emitter in quotes, not {shown(getattr(self, what))}")
         if not self.of:
-            unused, case = ["on", "count"], "without the name of an emitter in of"
+            unused, case = ["on", "count", "above"], "without the name of an emitter in of"
         elif self.on == "trail":
-            unused, case = ["count", "per_distance"], "with on = 'trail', which goes by rate and bursts"
+            unused, case = ["count", "above", "per_distance"], "with on = 'trail', which goes by rate and bursts"
         else:
             unused, case = ["rate", "per_distance", "bursts", "start", "stop"], f"with on = {self.on!r}: give count"
+            if self.on != "impact" and "above" in self.arguments:
+                unused, case = ["above"], f"with on = {self.on!r}: it is for impacts"
         for name in unused:
             if name in self.arguments:
                 raise InvalidInput(f"{name} means nothing {case}")

@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pointmass.collisions.impacts import NO_IMPACTS, Impacts
 from pointmass.engine.binding import kinds
 from pointmass.engine.energy import PairEnergy
 from pointmass.engine.island import IslandKernel, Outcome, Span
@@ -79,15 +80,20 @@ class Engine:
     reference : the engine that does everything, in NumPy.
     fastest, farthest : largest |v| [m/s] and |x| [m] of any component after the last span.
     died : rows of the particles that a surface killed in the last span, ascending; they are to be taken away.
+    watched : whether steps made `ahead` tell of impacts.
+    impacts : of the last such step.
     """
 
     system: ParticleSystem
     solver: Solver
     wanted: bool
+    watched: bool = False
     reference: ReferenceEngine = field(init=False)
     fastest: float = 0.0
     farthest: float = 0.0
     died: Rows = field(default_factory=lambda: np.zeros(0, np.intp))
+    impacts: Impacts = NO_IMPACTS
+    _hit: Rows = field(default_factory=lambda: np.zeros(0, np.intp))  # who has hit a surface in the last span
     _before: tuple[Array, Array] | None = None
     _looked: bool = False  # whether the last step can no longer be looked into
     _last: Any = None  # span, births and ids, and what the reference path knew before it
@@ -97,7 +103,7 @@ class Engine:
     _structure: Rows | None = None  # islands that the groups are made of
 
     def __post_init__(self) -> None:
-        self.reference = ReferenceEngine(self.system, self.solver)
+        self.reference = ReferenceEngine(self.system, self.solver, watched=self.watched)
 
     @property
     def stats(self) -> Stats:
@@ -248,6 +254,7 @@ class Engine:
                 p.x[group.rows], p.v[group.rows] = x.reshape(-1, 3), v.reshape(-1, 3)
         self.farthest, self.fastest = np.max([o.reach for o in outcomes], axis=0).tolist()
         self.died = np.unique(np.concatenate([self.died, *(o.died for o in outcomes)]))
+        self._hit = np.unique(np.concatenate([self._hit, *(o.hit for o in outcomes)]))
         works = [o.stats for o in outcomes]
         work = sum(works, Stats())
         work.steps, work.evaluations = max(w.steps for w in works), max(w.evaluations for w in works)
@@ -289,8 +296,10 @@ class Engine:
             p.x[:], p.v[:], system.t = x, v, t
             self.reference.leave(left)
 
-    def ahead(self, rows: Rows, span: Span, births: Array, compiled: bool) -> None:
-        """Take some particles over a span, and those that they are joined to; for a `rehearsal`.
+    def ahead(self, rows: Rows, step: Span, births: Array, compiled: bool) -> None:
+        """Take some particles over one step, and those that they are joined to; for a `rehearsal`.
+
+        `died` and `impacts` tell then what became of them.
 
         Parameters
         ----------
@@ -302,21 +311,37 @@ class Engine:
         Diverged
             Something goes wrong on the way.
         """
+        self.died, self._hit = self.died[:0], self._hit[:0]
         if not compiled:
             waits = np.full(len(births), not self.coupled)
             waits[rows] = False
-            for k in range(span.count):
-                end = span.time(k + 1)
-                self.reference.step(span.time(k), end, np.where(waits, end, np.clip(births, span.time(k), end)))
+            self.reference.step(step.start, step.end, np.where(waits, step.end, births))
+            self.died, self.impacts = self.reference.died, self.reference.impacts
             return
         if self.coupled:
-            groups = self._grouped(births, span.start)
+            groups = self._grouped(births, step.start)
         else:
             kind, how = (SinglesKernel, True) if _by_lanes(self.solver) else (IslandKernel, False)
             groups = [self._made(kind, rows, self.system.island_of_particle, how)]
         self._keep()
-        if not self._launch(span, births, groups):
+        left = self.reference.left()
+        if not self._launch(step, births, groups):
             raise Diverged("a particle that others follow goes astray")
+        self.impacts = self._impacts_of(self._hit, step, births, left) if self.watched else NO_IMPACTS
+
+    def _impacts_of(self, rows: Rows, step: Span, births: Array, left: Any) -> Impacts:
+        """What happened to those who have hit something in a step: it is made again for them on the reference path."""
+        if not len(rows):
+            return NO_IMPACTS
+        assert self._before is not None
+        islands = self.system.island_of_particle
+        rows = np.flatnonzero(np.isin(islands, islands[rows])) if self.coupled else np.sort(rows)
+        part = self.system.part(rows)
+        part.particles.x[:], part.particles.v[:] = self._before[0][rows], self._before[1][rows]
+        again = ReferenceEngine(part, self.solver, watched=True)
+        again.leave(left)
+        again.step(step.start, step.end, births[rows])
+        return replace(again.impacts, rows=rows[again.impacts.rows])
 
     def state_at(self, t: float) -> Array:
         """State of the present particles at a time within the last step, shape (dim,); nothing is changed.
@@ -426,7 +451,7 @@ class Engine:
             self._kernels = (made_of, {})
         known = self._kernels[1]
         if (kind, *how) not in known:
-            known[kind, *how] = kind(self.system, self.solver, *how)
+            known[kind, *how] = kind(self.system, self.solver, *how, watched=self.watched)
         return known[kind, *how]
 
     def _kinds(self) -> tuple[Any, ...]:

@@ -78,6 +78,7 @@ class Outcome:
     reach : largest |x| [m] and |v| [m/s] of a component.
     again : whether it had too little room, and has enough for another try now.
     died : rows of the particles that a surface killed.
+    hit : rows of those that may have hit a surface, all who did among them, if the kernel was to watch.
     """
 
     good: bool
@@ -85,6 +86,7 @@ class Outcome:
     stats: Stats
     again: bool = False
     died: Rows = field(default_factory=lambda: np.zeros(0, np.intp))
+    hit: Rows = field(default_factory=lambda: np.zeros(0, np.intp))
 
 
 class IslandKernel:
@@ -93,6 +95,7 @@ class IslandKernel:
     Parameters
     ----------
     parallel : one large island by all threads, instead of many by one thread each.
+    watched : whether it tells who hits a surface.
     """
 
     def __init__(
@@ -102,8 +105,10 @@ class IslandKernel:
         parallel: bool,
         alone: bool = False,
         binder: Binder | None = None,
+        watched: bool = False,
     ) -> None:
         self.system, self.solver = system, solver
+        self._watched = watched
         self.dtype = str(system.particles.dtype)
         self.deriv = Deriv(system, parallel, solver.implicit, alone, binder)
         self.impacts = self._impacts()
@@ -134,6 +139,16 @@ class IslandKernel:
     def deadly(self) -> bool:
         """Whether a surface kills."""
         return self.deriv.contact is not None and self.deriv.contact.kills
+
+    @property
+    def watched(self) -> bool:
+        """Whether it tells who hits a surface."""
+        return self._watched and self.impacts is not None
+
+    def marked(self, hit: NDArray[np.uint8]) -> NDArray[np.bool_]:
+        """Whom marks say to have hit a surface; there are none for the lecture's test at the end of a step."""
+        contact = self.deriv.contact
+        return np.full(len(hit), self.watched) if contact is not None and contact.discrete else hit > 0
 
     @property
     def work(self) -> list[str]:
@@ -304,6 +319,7 @@ class IslandKernel:
             alive, dead = " and alive", ["alive = True"]
             deaths = ["for i in range(n):", f"    if events[i] >= {KILLED}:", "        died[base + i] = 1"]
             deaths.append("        alive = False")
+        hits = ["for i in range(n):", "    if events[i] > 0:", "        hit[base + i] = 1"] if self.watched else []
         island = [
             "base = first[island]",
             "n = first[island + 1] - base",
@@ -323,7 +339,7 @@ class IslandKernel:
             *indented(anew, 1),
             f"    if clock < end and bad == 0{alive}:",
             f"        bad = advance({call})",
-            *indented(deaths, 2),
+            *indented([*deaths, *hits], 2),
             "far, fast = reached(xi, 0, 3 * n), reached(vi, 0, 3 * n)",
             f"status[island] = bad if far < np.inf and fast < np.inf else {NOT_FINITE}",
             "reach[island, 0] = far",
@@ -331,7 +347,7 @@ class IslandKernel:
         ]
         layouts = [*self.step.arrays, "first_slice"] if kinds else []
         data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers), *layouts, *tiles.values()])
-        mortal = ["died"] * self.deadly
+        mortal = ["died"] * self.deadly + ["hit"] * self.watched
         grid = ", ".join([*self.memory, "birth, t0, dt, k0, count, lengths, controls, work, status, reach", *mortal])
         given = f"lo, hi, first, x, v, {data}, {grid}"
         return entry_text(self.scratch, given, ["for island in range(lo, hi):", *indented(island, 1)])
@@ -428,7 +444,7 @@ class IslandMembers:
         dtype = self.kernel.system.particles.dtype
         data = deriv.binder.data(count, self.order)
         contact = [] if deriv.contact is None else [deriv.contact.table()]
-        died = np.zeros(count, np.uint8)
+        died, hit = np.zeros((2, count), np.uint8)
         starts, most = [], [int(np.diff(self.first).max(initial=0))]
         for k, family in enumerate(deriv.families):
             data += [self.tiles[k].nodes, family.tiled.array(len(self.tiled[k]), dtype, self.tiled[k])]
@@ -474,6 +490,7 @@ class IslandMembers:
             status,
             reach,
             *[died] * self.kernel.deadly,
+            *[hit] * self.kernel.watched,
         )
         kernel = self.kernel.functions["run"]
         scratch = self.kernel.functions["scratch"]
@@ -491,7 +508,9 @@ class IslandMembers:
         if (status & FULL).any():
             for pairs in self.pairs:
                 pairs.enlarge()
-        return Outcome(not status.any(), reach.max(axis=0), stats, bool((status == FULL).any()), self.rows[died > 0])
+        again = bool((status == FULL).any())
+        told = self.rows[died > 0], self.rows[self.kernel.marked(hit)]
+        return Outcome(not status.any(), reach.max(axis=0), stats, again, *told)
 
     def _view(self, memory: Memory, name: str, part: int) -> Array:
         """The part of a memory entry that belongs to x or to v, shape (n, 3)."""

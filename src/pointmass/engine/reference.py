@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pointmass.collisions.collider import Collider, directions, lengths, rows_dot
 from pointmass.collisions.contact import Contacts
 from pointmass.collisions.discrete import bounce
+from pointmass.collisions.impacts import Impacts
 from pointmass.collisions.response import respond
 from pointmass.collisions.swept import Paths, first_hit
 from pointmass.errors import PointmassError
@@ -57,6 +58,7 @@ class ReferenceEngine:
     memory : what the solver remembers between steps.
     stats : work done so far.
     died : rows of the particles that a surface killed in the last step, to be taken away.
+    watched : whether impacts are to be told.
     """
 
     system: ParticleSystem
@@ -64,6 +66,7 @@ class ReferenceEngine:
     memory: Memory = field(default_factory=dict)
     stats: Stats = field(default_factory=Stats)
     died: Rows = field(default_factory=lambda: np.zeros(0, np.intp))
+    watched: bool = False
 
     def __post_init__(self) -> None:
         surfaces = surfaces_of(self.system)
@@ -73,6 +76,7 @@ class ReferenceEngine:
         self._last_hits = np.array([1 + KILLED * (s.response == "kill") for s in self._swept], np.int64)
         self._contacts = Contacts(surfaces, self.system.order, self.solver.implicit)
         self._pieces: list[Piece] = []
+        self._seen: list[Impacts] = []
         self._ids = self.system.particles.id
         self._islands = self.system.island_of_particle
         self._left = self._touchable()
@@ -91,7 +95,7 @@ class ReferenceEngine:
             A number is no longer finite, or the solver cannot take its step. The system keeps its state.
         """
         system = self.system
-        self._pieces = []
+        self._pieces, self._seen = [], []
         self.memory = self._fitted_memory()
         self._ids, self._islands = system.particles.id, system.island_of_particle
         self._events = np.zeros(len(self._ids), np.int64)
@@ -116,6 +120,11 @@ class ReferenceEngine:
         system.set_state(y, t1)
         if self.memory:
             self._left = self._touchable()
+
+    @property
+    def impacts(self) -> Impacts:
+        """Those of the last step, if it was `watched`."""
+        return Impacts.of(self._seen)
 
     def recall(self) -> Memory:
         """A copy of what the solver remembers, for the particles as they are now."""
@@ -239,10 +248,14 @@ class ReferenceEngine:
         self._contacts.settle(x, v, end, length, p.radius)
         moved = (length > 0) & ~p.pinned
         doomed = np.zeros(len(p), bool)
+        bounced: list[Impacts] = []
         for surface in self._discrete:
+            before = v.copy()
             hit = bounce(surface, x, v, end, p.radius, moved)
             reset[islands[hit]] = True
             doomed |= hit & (surface.response == "kill")
+            if self.watched:
+                bounced.append(Impacts.at(surface, np.flatnonzero(hit), end[hit], x[hit], before[hit], v[hit]))
         if self._swept:
             paths, planned = self._paths(step, x, v, start, length), (x.copy(), v.copy())
             rows = self._impacts(paths, np.flatnonzero(moved), x, v, clock)
@@ -251,7 +264,8 @@ class ReferenceEngine:
             if len(linked):
                 self._pay(linked, paths.v1[linked], planned, x, v, end)
         now = np.where(np.isnan(clock[islands]), end, clock[islands])
-        self._events[doomed & (now == end)] += KILLED
+        self._events[doomed & (now == end)] += KILLED  # who hit something earlier on does not come to the end
+        self._seen += [part.take((now == end)[part.rows]) for part in bounced]
         self._evict(x, v, now, moved)
         fix = y - step.y1
         _by_particle(fix, system.order)[:, ~np.isnan(clock[islands])] = 0
@@ -338,7 +352,10 @@ class ReferenceEngine:
         for k in np.unique(which):
             surface, at = self._swept[k], which == k
             normal, motion = surface.normal(place[at], now[at]), surface.velocity(now[at])
-            speed[at] = respond(speed[at], normal, motion, *surface.impact)
+            before = speed[at]
+            speed[at] = respond(before, normal, motion, *surface.impact)
+            if self.watched:
+                self._seen.append(Impacts.at(surface, rows[at], now[at], place[at], before, speed[at]))
             self._ground[rows[at]] = motion
             rest = at & tired
             speed[rest] = surface.velocity(end[rest])

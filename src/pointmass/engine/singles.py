@@ -209,14 +209,15 @@ class SinglesKernel:
     Parameters
     ----------
     births : whether some may not be born yet.
+    watched : whether it tells who hits a surface.
     """
 
-    def __init__(self, system: ParticleSystem, solver: Solver, births: bool) -> None:
+    def __init__(self, system: ParticleSystem, solver: Solver, births: bool, watched: bool = False) -> None:
         self.system, self.solver, self.births = system, solver, births
         self.motion = Motion(system, solver, births)
         self.island: IslandKernel | None = None
         if births or system.colliders:
-            self.island = IslandKernel(system, solver, parallel=False, alone=True, binder=self.motion.binder)
+            self.island = IslandKernel(system, solver, False, alone=True, binder=self.motion.binder, watched=watched)
         self.state = [(q, a) for q in ("xv" if system.order == 2 else "x") for a in AXES]
         self.text = self._printed()
 
@@ -320,6 +321,7 @@ class SinglesKernel:
         mortal = island.deadly
         alive = " and died[lo + i] == 0" if mortal else ""
         death = [f"died[lo + i] = 1 if events[0] >= {KILLED} else 0"] if mortal else []
+        death += ["if events[0] > 0:", "    hit[lo + i] = 1"] if island.watched else []
         # Most of the steps that somebody waited for are clear after all: only those that are not take the long way.
         easy = f"clock == t0 + j * dt and lane(np.uintp(i), {', '.join(self.shared)}, clock, end)"
         return [
@@ -373,7 +375,7 @@ class SinglesKernel:
         steps = ["while k < k0 + count:", *indented([*steps, *caught, "k += stride"], 1)]
         arrays = [*motion.binder.arrays, *(["F"] if self.system.colliders else [])]
         given = f"first, last, x, v, x_kept, v_kept, {', '.join(arrays)}, birth, t0, dt, k0, count, status, reach"
-        given += ", died" if self.deadly else ""
+        given += ", died" * self.deadly + ", hit" * self.watched
         made = [f"s = np.ones({(STATE + columns) * W}, R)", *prepared]
         own = [f"    s[{(STATE + c) * W} + i] = C[{c}, lo + i]" for c in range(columns)]
         tile = [
@@ -398,6 +400,11 @@ class SinglesKernel:
     def deadly(self) -> bool:
         """Whether a surface kills."""
         return self.island is not None and self.island.deadly
+
+    @property
+    def watched(self) -> bool:
+        """Whether it tells who hits a surface."""
+        return self.island is not None and self.island.watched
 
     @property
     def shared(self) -> list[str]:
@@ -461,9 +468,11 @@ class SingleMembers:
         status, reach = np.zeros(tiles, np.int64), np.zeros((tiles, 2), x.dtype)
         grid = (span.t0, span.dt, span.first, span.count)
         kernel, scratch = self.kernel.functions["run"], self.kernel.functions["scratch"]
-        died = np.zeros(count, np.uint8)
-        arrays = (x, v, *kept, *data, *grid, status, reach, *[died] * self.kernel.deadly)
+        died, hit = np.zeros((2, count), np.uint8)
+        marks = [*[died] * self.kernel.deadly, *[hit] * self.kernel.watched]
+        arrays = (x, v, *kept, *data, *grid, status, reach, *marks)
         spread(lambda lo, hi: kernel(lo, hi, *arrays, *scratch([1])), tiles, GRAIN)
         work = Stats(span.count, 0, span.count * motion.evaluations)
         far = reach.max(axis=0).astype(np.float64)
-        return Outcome(not status.any(), far, work, died=self.rows[died > 0])
+        touched = hit > 0 if island is None else island.marked(hit)
+        return Outcome(not status.any(), far, work, died=self.rows[died > 0], hit=self.rows[touched])

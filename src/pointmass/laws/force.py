@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,6 +110,13 @@ class Force(Described, ABC):
 
     def __getstate__(self) -> dict[str, Any]:
         return {k: v for k, v in self.__dict__.items() if not isinstance(getattr(type(self), k, None), cached_property)}
+
+    def twin(self) -> Self:
+        """The same force once more, for other particles: what was traced is shared, columns of numbers are not."""
+        result = object.__new__(type(self))
+        result.__dict__ |= self.__dict__
+        result.parameters = {name: parameter.twin() for name, parameter in self.parameters.items()}
+        return result
 
     @property
     def name(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -154,6 +155,12 @@ class Parameter:
                 )
             if c.formula is not None:
                 c.formula.restrict(["t", *particles.columns])
+
+    def twin(self) -> Parameter:
+        """The same parameter once more, whose columns can follow other particles."""
+        result = copy(self)
+        result.components = [copy(c) for c in self.components]
+        return result
 
     def keep(self, mask: NDArray[np.bool_]) -> None:
         """Keep the rows of a mask in columns of numbers."""
