@@ -86,6 +86,39 @@ def attractor_energy(x, v, m, t, mu, center, eps):
     return -mu * m / math.sqrt(dot(d, d) + eps**2)
 
 
+def to_line(x, a, b):
+    """From the nearest of many places of a line to x."""
+    ways = [sub(x, [a[k] + j / 20000 * (b[k] - a[k]) for k in range(3)]) for j in range(20001)]
+    return min(ways, key=norm)
+
+
+def to_ring(x, center, axis, radius):
+    """From the nearest of many places of a circle to x."""
+    e = scale(1 / norm(axis), axis)
+    p = cross(e, (1, 0, 0) if abs(e[0]) < 0.9 else (0, 1, 0))
+    p = scale(radius / norm(p), p)
+    q = cross(e, p)
+    angles = [2 * math.pi * j / 20000 for j in range(20000)]
+    places = ([center[k] + math.cos(s) * p[k] + math.sin(s) * q[k] for k in range(3)] for s in angles)
+    return min((sub(x, place) for place in places), key=norm)
+
+
+def pull(x, v, m, t, way, strength, power, eps, reach=None):
+    """Towards shapes, with the way from each of them to x."""
+    force = [0.0, 0.0, 0.0]
+    for d in way(x):
+        a = strength * norm(d) / math.hypot(norm(d), eps) ** (power + 1)
+        if reach is not None:
+            a *= (1 - (norm(d) / reach) ** 2) ** 2 if norm(d) < reach else 0
+        force = [f - m * a * c / norm(d) if norm(d) > 0 else f for f, c in zip(force, d, strict=True)]
+    return force
+
+
+def pull_energy(x, v, m, t, way, strength, power, eps):
+    far = [math.hypot(norm(d), eps) for d in way(x)]
+    return sum(m * strength * (math.log(r) if power == 1 else (r ** (1 - power) - 1) / (1 - power)) for r in far)
+
+
 def harmonic(x, v, m, t, k_s, center, k_d):
     return [-k_s * (x[a] - center[a]) - k_d * v[a] for a in range(3)]
 

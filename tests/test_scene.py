@@ -29,7 +29,8 @@ from pointmass.toml import dumps
 SCHEMA = Path(__file__).parent.parent / "docs" / "scene.schema.json"
 VALIDATOR = jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text()))
 SQUARE = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]]
-NEEDED: dict[str, dict[str, Any]] = {  # what cannot be left out, by kind
+NEEDED: dict[str, dict[str, Any]] = {
+    "surface_attractor": {"around": [{"type": "sphere", "radius": 0.4}]},  # what cannot be left out, by kind
     "springs": {"pairs": [[0, 1], [1, 2]]},
     "angles": {"joints": [[0, 1, 2]]},
     "field": {"force": ["-k*x", "0.1*sin(t)", "vx*0"], "constants": {"k": 2.0}},

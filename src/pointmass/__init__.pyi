@@ -142,6 +142,9 @@ from .forces import (
     LennardJones as LennardJones,
 )
 from .forces import (
+    LineAttractor as LineAttractor,
+)
+from .forces import (
     Magnetic as Magnetic,
 )
 from .forces import (
@@ -151,10 +154,16 @@ from .forces import (
     QuadraticDrag as QuadraticDrag,
 )
 from .forces import (
+    RingAttractor as RingAttractor,
+)
+from .forces import (
     SoftSphere as SoftSphere,
 )
 from .forces import (
     Springs as Springs,
+)
+from .forces import (
+    SurfaceAttractor as SurfaceAttractor,
 )
 from .forces import (
     Vortex as Vortex,

@@ -18,11 +18,14 @@ from pointmass.forces.grid_files import load_grid
 from pointmass.forces.gust import Gust
 from pointmass.forces.harmonic import Harmonic
 from pointmass.forces.lennard_jones import LennardJones
+from pointmass.forces.line_attractor import LineAttractor
 from pointmass.forces.magnetic import Magnetic
 from pointmass.forces.point_vortices import PointVortices
 from pointmass.forces.quadratic_drag import QuadraticDrag
+from pointmass.forces.ring_attractor import RingAttractor
 from pointmass.forces.soft_sphere import SoftSphere
 from pointmass.forces.springs import Springs
+from pointmass.forces.surface_attractor import SurfaceAttractor
 from pointmass.forces.vortex import Vortex
 from pointmass.forces.vortex_line import VortexLine
 from pointmass.forces.vortex_ring import VortexRing
@@ -36,6 +39,9 @@ FORCES: dict[str, type[Force]] = {
     "springs": Springs,
     "angles": Angles,
     "attractor": Attractor,
+    "line_attractor": LineAttractor,
+    "ring_attractor": RingAttractor,
+    "surface_attractor": SurfaceAttractor,
     "harmonic": Harmonic,
     "gravitation": Gravitation,
     "lennard_jones": LennardJones,
@@ -72,11 +78,14 @@ __all__ = [
     "Gust",
     "Harmonic",
     "LennardJones",
+    "LineAttractor",
     "Magnetic",
     "PointVortices",
     "QuadraticDrag",
+    "RingAttractor",
     "SoftSphere",
     "Springs",
+    "SurfaceAttractor",
     "Vortex",
     "VortexLine",
     "VortexRing",

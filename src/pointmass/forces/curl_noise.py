@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from copy import copy
+from collections.abc import Sequence
 from math import sqrt
-from typing import Any, Protocol
+from typing import Any
 
-from pointmass.errors import InvalidInput, shown, whole_number
+from pointmass.errors import whole_number
+from pointmass.forces.solids import Solid, Solids
 from pointmass.laws.parameter import Parameter, Scalar, seed_parameter
 from pointmass.laws.unary import VelocityField
 from pointmass.particles import Selection
@@ -16,26 +16,6 @@ from pointmass.tracing.derivative import gradient
 from pointmass.tracing.noise import OFFSETS, mean_square, single
 
 Triple = tuple[Any, ...]
-
-
-class Solid(Protocol):
-    """What a collider tells about its shape: see `collisions.Collider`."""
-
-    @property
-    def distance_law(self) -> Callable[..., Any]:
-        """Signed distance [m]."""
-
-    @property
-    def normal_law(self) -> Callable[..., Any]:
-        """Unit normal."""
-
-    @property
-    def shape(self) -> tuple[float, ...]:
-        """Numbers that the laws take."""
-
-    @property
-    def surfaces(self) -> Sequence[Any]:
-        """Parts with a smooth distance."""
 
 
 class CurlNoise(VelocityField):
@@ -81,7 +61,7 @@ class CurlNoise(VelocityField):
         enabled: bool = True,
     ) -> None:
         self.octaves = whole_number("octaves", octaves, at_least=1)
-        self.solids = [surface for solid in _listed(around) for surface in solid.surfaces]
+        self.solids = Solids(around)
         parameters = [
             Parameter("length", length, unit="m", above=0),
             Parameter("speed", speed, unit="m/s"),
@@ -94,11 +74,7 @@ class CurlNoise(VelocityField):
             parameters.pop()
         if distance is not None:
             parameters.append(Parameter("distance", distance, unit="m", above=0))
-        for k, solid in enumerate(self.solids):
-            place = copy(solid.motion.parameters[0])
-            place.name = f"around{k}_place"
-            parameters += [place, *(Parameter(f"around{k}_{j}", number) for j, number in enumerate(solid.shape))]
-        super().__init__(parameters, on, enabled)
+        super().__init__([*parameters, *self.solids.parameters], on, enabled)
 
     def law(self, x: Any, t: Any, *parameters: Any) -> Any:
         """Velocity [m/s]."""
@@ -124,11 +100,9 @@ class CurlNoise(VelocityField):
     def _around_solids(self, x: Triple, psi: Triple, own: dict[str, Any]) -> Triple:
         """The stream function that no surface is crossed by: on each, it points along the normal."""
         normals, ramps, reach = [], [], own.get("distance", own["length"])
-        for k, solid in enumerate(self.solids):
-            from_place = fn.sub(x, own[f"around{k}_place"])
-            shape = [own[f"around{k}_{j}"] for j in range(len(solid.shape))]
-            normals.append(solid.normal_law(from_place, *shape))
-            ramps.append(_ramp(solid.distance_law(from_place, *shape) / reach))
+        for distance, normal in self.solids.met(x, own):
+            normals.append(normal)
+            ramps.append(_ramp(distance / reach))
         result = fn.scale(_product(ramps), psi)
         for k, (n, a) in enumerate(zip(normals, ramps, strict=True)):
             others = _product([*ramps[:k], *ramps[k + 1 :]])
@@ -148,11 +122,3 @@ def _product(factors: Sequence[Any]) -> Any:
     for factor in factors:
         result = result * factor
     return result
-
-
-def _listed(around: Any) -> list[Any]:
-    solids = list(around) if isinstance(around, (list, tuple)) else [around]
-    for solid in solids:
-        if not hasattr(solid, "distance_law"):
-            raise InvalidInput(f"around must be a list of colliders, such as [Sphere()], not {shown(around)}")
-    return solids
