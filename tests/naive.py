@@ -146,6 +146,23 @@ def wind(x, v, m, t, air, k):
     return scale(k, sub(air(x, t), v))
 
 
+def plate_wind(x, v, air, density, drag, lift):
+    """On each corner of a triangle."""
+    middle = [sum(p[k] for p in x) / 3 for k in range(3)]
+    w = sub(air(middle), [sum(p[k] for p in v) / 3 for k in range(3)])
+    n = cross(sub(x[1], x[0]), sub(x[2], x[0]))
+    area = norm(n) / 2
+    if area == 0 or norm(w) == 0:
+        return [[0.0, 0.0, 0.0]] * 3
+    n = scale(math.copysign(1, dot(n, w)) / norm(n), n)
+    e = scale(1 / norm(w), w)
+    cosine = dot(n, e)
+    force = scale(
+        density / 2 * area * dot(w, w) * cosine, [drag * e[k] + lift * (n[k] - cosine * e[k]) for k in range(3)]
+    )
+    return [scale(1 / 3, force)] * 3
+
+
 def formula(x, v, m, t, function):
     return list(function(x, v, m, t))
 

@@ -33,6 +33,7 @@ NEEDED: dict[str, dict[str, Any]] = {
     "surface_attractor": {"around": [{"type": "sphere", "radius": 0.4}]},  # what cannot be left out, by kind
     "springs": {"pairs": [[0, 1], [1, 2]]},
     "angles": {"joints": [[0, 1, 2]]},
+    "plate_wind": {"triangles": [[0, 1, 2]]},
     "field": {"force": ["-k*x", "0.1*sin(t)", "vx*0"], "constants": {"k": 2.0}},
     "flow": {"velocity": ["-y", "x", "0.1*t"]},
     "points": {"x": [[0.0, 1.0, 0.0], [0.5, 1.2, 0.1]]},
@@ -47,7 +48,7 @@ OTHER: dict[str, Any] = {  # another value than the default, by annotation
     "Scalar": "0.5 + 0.1*sin(t)",
     "Scalar | None": 0.25,
     "Vector": [0.3, "0.1*cos(t)", -0.2],
-    "Vector | VelocityField": {"type": "vortex", "circulation": 2.0},
+    "Velocity": {"type": "vortex", "circulation": 2.0},
     "Selection": "others",
     "str": "end",
 }

@@ -148,6 +148,9 @@ from .forces import (
     Magnetic as Magnetic,
 )
 from .forces import (
+    PlateWind as PlateWind,
+)
+from .forces import (
     PointVortices as PointVortices,
 )
 from .forces import (

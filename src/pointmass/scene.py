@@ -389,6 +389,11 @@ def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, fol
     try:
         if isinstance(values.get("velocity"), Mapping):
             values["velocity"] = _made(FORCES, values["velocity"], f"{where}.velocity", folder)
+        if isinstance(values.get("velocity"), list):
+            values["velocity"] = [
+                _made(FORCES, part, f"{where}.velocity.{k}", folder) if isinstance(part, Mapping) else part
+                for k, part in enumerate(values["velocity"])
+            ]
         if "around" in values:
             solids = enumerate(values["around"])
             values["around"] = [_made(COLLIDERS, solid, f"{where}.around.{k}", folder) for k, solid in solids]

@@ -114,7 +114,7 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
     "str": (str, "text in quotes"),
 }
 UNKNOWN = (Any, "another value")
-FLOW_OR_VECTOR = "Vector | VelocityField"
+AIR = "Velocity"
 SOLIDS = "Sequence[Solid]"
 SHORT = {
     "Contact": "Literal['swept', 'discrete']",
@@ -246,9 +246,10 @@ def form_of(annotation: str) -> tuple[Any, str]:
     if annotation.startswith("tuple[float"):
         count = annotation.count("float")
         return _exactly(count, float), f"a list of {count} numbers"
-    if annotation == FLOW_OR_VECTOR:
+    if annotation == AIR:
         kind, words = VECTOR
-        return Union[kind, _flows()], f"{words}, or a table with the type of a flow"  # noqa: UP007
+        several = list[Union[_flows(), kind]]  # type: ignore[misc, valid-type] # noqa: UP007
+        return Union[kind, _flows(), several], f"{words}, a table with the type of a flow, or a list of both"  # noqa: UP007
     if annotation == SOLIDS:
         return list[_one_of("colliders", tuple(COLLIDERS))], "a list of tables, each with the type of a collider"  # type: ignore[misc]
     return FORMS.get(annotation, UNKNOWN)
@@ -341,6 +342,10 @@ def _check_entry(where: str, what: str, table: Any, registry: Mapping[str, Any])
     nested = table.get("velocity")
     if what == "forces" and isinstance(nested, Mapping):
         _check_entry(f"{where}.velocity", "forces", nested, _flow_kinds())
+    if what == "forces" and isinstance(nested, list):
+        for k, part in enumerate(nested):
+            if isinstance(part, Mapping):
+                _check_entry(f"{where}.velocity.{k}", "forces", part, _flow_kinds())
     if isinstance(around := table.get("around"), list):
         for k, solid in enumerate(around):
             _check_entry(f"{where}.around.{k}", "colliders", solid, COLLIDERS)

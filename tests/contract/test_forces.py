@@ -125,6 +125,27 @@ EXAMPLES: dict[str, list[Example]] = {
             text=False,
         ),
     ],
+    "plate_wind": [
+        Example(
+            {"triangles": JOINTS, "velocity": (3.0, "t", 1.0), "drag": [1.0, 1.5], "lift": "1 + t", "density": 1.3},
+            lambda e: {"air": lambda x: (3, TIME, 1), "drag": (1, 1.5)[e], "lift": 1 + TIME, "density": 1.3},
+            naive.plate_wind,
+            elements=JOINTS,
+        ),
+        Example(
+            {"triangles": JOINTS, "velocity": [Vortex(2.0, eps=0.1), (0, 1, 0)], "lift": 0.0},
+            lambda e: {
+                "air": lambda x: [
+                    a + b
+                    for a, b in zip(naive.vortex(x, 0, 0, 0, 2.0, (0, 0, 0), (0, 0, 1), 0.1), (0, 1, 0), strict=True)
+                ],
+                **{"drag": 1.2, "lift": 0.0, "density": 1.2},
+            },
+            naive.plate_wind,
+            elements=JOINTS,
+            text=False,
+        ),
+    ],
     "line_attractor": [
         Example(
             {"a": (0.1, 0.3, 0), "b": ("1 + t", 0, 0.5), "strength": 2.0, "power": 1.5, "eps": 0.2},

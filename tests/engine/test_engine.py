@@ -57,7 +57,7 @@ LAWS: dict[str, list[Callable[[], pm.Force]]] = {
     "surface_attractor": [lambda: pm.SurfaceAttractor([pm.Sphere(("t", 0, 0)), pm.Plane()])],
     "harmonic": [lambda: pm.Harmonic(4.0, center=("cos(t)", 0, 1), k_d=0.2)],
     "magnetic": [lambda: pm.Magnetic((0.1, 0.2, 1.0))],
-    "wind": [lambda: pm.Wind(("3*sin(t)", 0, 0)), lambda: pm.Wind(pm.Vortex(2.0, eps=0.2))],
+    "wind": [lambda: pm.Wind(("3*sin(t)", 0, 0)), lambda: pm.Wind([pm.Vortex(2.0, eps=0.2), ("t", 1, 0)])],
     "field": [
         lambda: pm.Field(("-k*x", "sin(t)*y", "-z**3"), constants={"k": 2.0}),
         lambda: pm.Field(potential="0.5*k*x**2 + charge*y", constants={"k": 2.0}),
@@ -67,6 +67,7 @@ LAWS: dict[str, list[Callable[[], pm.Force]]] = {
     "springs": [
         lambda: pm.Springs([(0, 1), (1, 2), (5, 2), (6, 7)], 20.0, [0.5, 0.1, 0.2, 0.3], rest="1 + 0.2*sin(9*t)")
     ],
+    "plate_wind": [lambda: pm.PlateWind([(0, 1, 2), (2, 5, 6)], [pm.Vortex(2.0, eps=0.2), (1, "t", 0)])],
     "angles": [lambda: pm.Angles([(0, 1, 2), (2, 5, 1)], 2.0, 0.1, rest=0.5)],
     "own": [lambda: own(strength="charge"), lambda: corner(elements=[(0, 1, 2), (5, 6, 7)])],
     "flow": [

@@ -44,6 +44,10 @@ def test_registry():
         (Field(grid=VECTOR, scale="2*t"), [1, 1, 1]),
         (Wind(Flow(("t", "charge", "x"))), 0.1 * np.array([0.5 - 4, 7 - 5, 1 - 6])),
         (Wind(Flow(grid=VECTOR, scale=2.0), k=1.0), [-2, -3, -4]),
+        (
+            Wind([Flow(("t", "charge", "x")), (1, 2, "t"), Flow(("1", "0", "0"))]),
+            0.1 * np.array([2.5 - 4, 9 - 5, 1.5 - 6]),
+        ),
         (Wind(lambda t: (t, 0.0, 0.0), k=2.0), [-7, -10, -12]),
     ],
 )
@@ -83,6 +87,8 @@ def test_values(force, expected):
         (lambda: Wind(Vortex), "must be three numbers or a velocity field"),
         (lambda: Wind(Gravity()), "must be three numbers or a velocity field"),
         (lambda: Wind(Vortex(on=[0])), "give `on` to Wind"),
+        (lambda: Wind([Vortex(), Gravity()]), "must be three numbers or a velocity field"),
+        (lambda: Wind([Vortex(), (1, 2, 3, 4)]), "velocity1"),
         (lambda: Wind(Flow(("nobody", "0", "0"))), "unknown name in velocity: 'nobody'"),
         (lambda: Vortex(axis=(0, 0, 0)), "must be a direction"),
         (lambda: Drag(q=1.0), "has no parameter 'q': known are k, on, enabled"),

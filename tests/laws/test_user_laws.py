@@ -288,7 +288,7 @@ def test_set_of_vectors_constants_springs_and_inner_fields():
     assert np.linalg.norm(force_of(springs)[0]) == pytest.approx(10 * (np.linalg.norm(X[0] - X[1]) - 0.5))
     wind = Wind(Vortex(circulation="t"), k=1.0)
     before = force_of(wind, t=1.0) + V
-    wind.flow.set(circulation=2.0)
+    wind.flows[0].set(circulation=2.0)
     np.testing.assert_allclose(force_of(wind, t=1.0) + V, 2 * before, atol=1e-15)
     with pytest.raises(InvalidInput, match="another kind of value"):
         wind.set(velocity=(1, 0, 0))

@@ -20,6 +20,7 @@ from pointmass.forces.harmonic import Harmonic
 from pointmass.forces.lennard_jones import LennardJones
 from pointmass.forces.line_attractor import LineAttractor
 from pointmass.forces.magnetic import Magnetic
+from pointmass.forces.plate_wind import PlateWind
 from pointmass.forces.point_vortices import PointVortices
 from pointmass.forces.quadratic_drag import QuadraticDrag
 from pointmass.forces.ring_attractor import RingAttractor
@@ -55,6 +56,7 @@ FORCES: dict[str, type[Force]] = {
     "flutter": Flutter,
     "diffusion": Diffusion,
     "wind": Wind,
+    "plate_wind": PlateWind,
     "field": Field,
     "flow": Flow,
     "buoyancy": Buoyancy,
@@ -80,6 +82,7 @@ __all__ = [
     "LennardJones",
     "LineAttractor",
     "Magnetic",
+    "PlateWind",
     "PointVortices",
     "QuadraticDrag",
     "RingAttractor",

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from copy import copy
 from typing import Any
 
-from pointmass.errors import InvalidInput
-from pointmass.laws.parameter import Parameter, Scalar, Vector
-from pointmass.laws.unary import UnaryForce, VelocityField
+from pointmass.forces.air import Air, Velocity
+from pointmass.laws.parameter import Parameter, Scalar
+from pointmass.laws.unary import UnaryForce
 from pointmass.particles import Particles, Selection
 from pointmass.tracing import functions as fn
 
@@ -15,46 +14,40 @@ from pointmass.tracing import functions as fn
 class Wind(UnaryForce):
     """f = k (u(x, t) - v): viscous drag towards the velocity u of the air (lecture, "Viscous drag", in moving air).
 
+    Several winds would drag several times; what blows at the same time is one wind with several velocities.
+
     Parameters
     ----------
-    velocity : u [m/s]: three numbers, formulas or functions of t, or a velocity field such as `Vortex(...)` or
-        `Flow(("-y", "x", "0"))`, whose parameters stay its own: `wind.flow.set(circulation=2.0)`.
+    velocity : u [m/s]: three numbers, formulas or functions of t; or a velocity field such as `Vortex(...)` or
+        `Flow(("-y", "x", "0"))`; or a list of both, that add up. Parameters of a field stay its own:
+        `wind.flows[0].set(circulation=2.0)`.
     k : drag coefficient [N s/m], at least 0. With k = 6 pi mu r it is Stokes's law for a small ball.
+
+    Attributes
+    ----------
+    flows : the fields of the velocity.
+
+    Examples
+    --------
+    >>> pm.Wind([pm.Gust((4, 0, 0)), pm.Flutter((0.3, 0.1, 0.3))], k=1e-4)
     """
 
     def __init__(
         self,
-        velocity: Vector | VelocityField = (3.0, 0.0, 0.0),
+        velocity: Velocity = (3.0, 0.0, 0.0),
         k: Scalar = 0.1,
         *,
         on: Selection = None,
         enabled: bool = True,
     ) -> None:
-        self.flow = velocity if isinstance(velocity, VelocityField) else None
-        own = [Parameter("k", k, unit="N s/m", at_least=0)]
-        if isinstance(velocity, VelocityField):
-            if velocity.on is not None:
-                raise InvalidInput("the velocity field of a wind acts on all: give `on` to Wind instead")
-            own += [_renamed(p) for p in velocity.parameters.values()]
-        elif isinstance(velocity, type) or hasattr(velocity, "add_forces"):
-            raise InvalidInput(f"velocity must be three numbers or a velocity field such as Vortex(), not {velocity!r}")
-        else:
-            own.append(Parameter("velocity", velocity, vector=True, unit="m/s"))
-        super().__init__(own, on, enabled)
+        self._air = Air(velocity, "Wind")
+        self.flows = self._air.flows
+        super().__init__([Parameter("k", k, unit="N s/m", at_least=0), *self._air.parameters], on, enabled)
 
     def law(self, x: Any, v: Any, m: Any, t: Any, k: Any, *velocity: Any) -> Any:
         """Force [N]."""
-        air = self.flow.law(x, t, *velocity) if self.flow else velocity[0]
-        return fn.scale(k, fn.sub(air, v))
+        return fn.scale(k, fn.sub(self._air.law(x, t, velocity), v))
 
     def bind(self, particles: Particles) -> None:
-        if self.flow is not None:
-            self.flow.bind(particles)
+        self._air.bind(particles)
         super().bind(particles)
-
-
-def _renamed(parameter: Parameter) -> Parameter:
-    """A parameter of the inner field under a name of its own here; its numbers stay shared."""
-    result = copy(parameter)
-    result.name = f"velocity_{parameter.name}"
-    return result

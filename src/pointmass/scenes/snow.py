@@ -48,9 +48,8 @@ class Snow(ShippedScene):
     def build(self) -> Scene:
         """The air is full of flakes at the start; from then on they come from above and from where the wind does."""
         k = FLAKE * self.gravity / self.fall
-        # Each of the two winds drags with a half of k, so each has twice its speed: the air is the sum of both.
-        gust = Gust((2 * self.wind, 0.0, 0.3 * self.wind), self.gusts, self.gust_length, seed=self.seed)
-        flutter = Flutter((2 * self.flutter, 0.6 * self.flutter, 2 * self.flutter), 0.5, seed=self.seed)
+        gust = Gust((self.wind, 0.0, 0.15 * self.wind), self.gusts, self.gust_length, seed=self.seed)
+        flutter = Flutter((self.flutter, 0.3 * self.flutter, self.flutter), 0.5, seed=self.seed)
         surface: dict[str, Any] = {"restitution": 0.0, "friction": self.friction}
         drift = self.wind * HEIGHT / self.fall
         count = round(self.rate * HEIGHT / self.fall)
@@ -74,7 +73,7 @@ class Snow(ShippedScene):
                     mass=FLAKE,
                 )
             ],
-            forces=[Gravity((0.0, -self.gravity, 0.0)), Wind(gust, k / 2), Wind(flutter, k / 2)],
+            forces=[Gravity((0.0, -self.gravity, 0.0)), Wind([gust, flutter], k)],
             colliders=[
                 Plane(**surface),
                 Sphere((0.0, 0.85 * self.ball, 0.0), self.ball, **surface),

@@ -1,0 +1,82 @@
+"""The velocity of moving air: a vector, a velocity field, or several that add up."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from typing import Any
+
+import numpy as np
+
+from pointmass.errors import InvalidInput, shown
+from pointmass.laws.parameter import Parameter, Vector
+from pointmass.laws.unary import VelocityField
+from pointmass.particles import Particles
+from pointmass.tracing import functions as fn
+
+Velocity = Vector | VelocityField | Sequence[Vector | VelocityField]
+
+
+class Air:
+    """What a force takes as its parameter `velocity`.
+
+    Attributes
+    ----------
+    flows : the fields that it is made of; their parameters stay their own.
+    parameters : of the law.
+
+    Parameters
+    ----------
+    velocity : [m/s]: three numbers, formulas or functions of t, a velocity field, or a list of fields and of such
+        vectors, whose sum it is.
+    owner : what the force is called in messages.
+
+    Raises
+    ------
+    InvalidInput
+        Something else, or a field that acts on a selection of particles.
+    """
+
+    def __init__(self, velocity: Any, owner: str) -> None:
+        several = isinstance(velocity, (list, tuple, np.ndarray)) and any(_is_field(part) for part in velocity)
+        self._parts: list[tuple[VelocityField | None, list[Parameter]]] = []
+        for k, part in enumerate(velocity if several else [velocity]):
+            name = f"velocity{k}" if several else "velocity"
+            if isinstance(part, VelocityField):
+                if part.on is not None:
+                    raise InvalidInput(f"the velocity field of a wind acts on all: give `on` to {owner} instead")
+                self._parts.append((part, [_renamed(p, name) for p in part.parameters.values()]))
+            elif _is_field(part):
+                raise InvalidInput(
+                    f"velocity must be three numbers or a velocity field such as Vortex(), not {shown(part)}"
+                )
+            else:
+                self._parts.append((None, [Parameter(name, part, vector=True, unit="m/s")]))
+        self.flows = [flow for flow, _ in self._parts if flow is not None]
+        self.parameters = [p for _, own in self._parts for p in own]
+
+    def law(self, x: Any, t: Any, parameters: Sequence[Any]) -> Any:
+        """The velocity at a place and time [m/s], for the values of its parameters."""
+        values, result = list(parameters), None
+        for flow, own in self._parts:
+            mine, values = values[: len(own)], values[len(own) :]
+            part = mine[0] if flow is None else flow.law(x, t, *mine)
+            result = part if result is None else fn.add(result, part)
+        return result
+
+    def bind(self, particles: Particles) -> None:
+        """Check the fields against the particles."""
+        for flow in self.flows:
+            flow.bind(particles)
+
+
+def _is_field(part: Any) -> bool:
+    """Whether something is a force of any kind, or the class of one."""
+    return isinstance(part, type) or hasattr(part, "add_forces")
+
+
+def _renamed(parameter: Parameter, prefix: str) -> Parameter:
+    """A parameter of an inner field under a name of its own here; its numbers stay shared."""
+    result = copy(parameter)
+    result.name = f"{prefix}_{parameter.name}"
+    return result
