@@ -67,6 +67,9 @@ from .emitters import (
     LineEmitter as LineEmitter,
 )
 from .emitters import (
+    MeshEmitter as MeshEmitter,
+)
+from .emitters import (
     Normal as Normal,
 )
 from .emitters import (

@@ -25,6 +25,7 @@ from pointmass.frame import Camera
 from pointmass.laws.force import Force
 from pointmass.laws.grid import Grid
 from pointmass.look import Look
+from pointmass.meshes import TriangleMesh
 from pointmass.particles import Particles
 from pointmass.registries import LISTS
 from pointmass.simulation import DEFAULT_DT, Simulation
@@ -340,6 +341,8 @@ def _name(item: Any) -> str:
 
 def _plain(value: Any, where: str, folder: Path | None) -> Any:
     """Numbers, strings, lists and tables only."""
+    if isinstance(value, TriangleMesh):
+        return [value.vertices.tolist(), value.faces.tolist()]
     if isinstance(value, Grid):
         return _plain_grid(value, where, folder)
     if isinstance(value, (Spread, Normal)):
@@ -352,7 +355,7 @@ def _plain(value: Any, where: str, folder: Path | None) -> Any:
         return {str(k): _plain(v, where, folder) for k, v in value.items() if v is not None}
     if isinstance(value, (list, tuple, range)):
         return [_plain(v, where, folder) for v in value]
-    if isinstance(value, Path) or (isinstance(value, str) and where.endswith(".grid")):
+    if isinstance(value, Path) or (isinstance(value, str) and where.endswith((".grid", ".mesh"))):
         return _way(value, folder)
     if isinstance(value, (str, bool, int, float)):
         return value
@@ -399,6 +402,8 @@ def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, fol
             values["around"] = [_made(COLLIDERS, solid, f"{where}.around.{k}", folder) for k, solid in solids]
         if "grid" in values:
             values["grid"] = _grid(values["grid"], folder)
+        if isinstance(values.get("mesh"), str):
+            values["mesh"] = _found(values["mesh"], "mesh", folder)
         return registry[kind](**values)
     except InvalidInput as error:
         raise InvalidInput(f"{where} ({kind}): {error}") from None
@@ -408,12 +413,15 @@ def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, fol
 
 def _grid(value: Any, folder: Path | None) -> Any:
     settings = dict(value) if isinstance(value, Mapping) else {"path": value}
-    path = str(settings.pop("path"))
-    if "\0" in path:
-        raise InvalidInput(f"grid = {path!r} is not allowed: no file has a name with a zero character")
-    # Found again from wherever this scene, or a cache that keeps its text, is read.
-    path = path if folder is None else str((folder / path).resolve())
+    path = _found(str(settings.pop("path")), "grid", folder)
     return load_grid(path, **settings) if settings else path
+
+
+def _found(path: str, what: str, folder: Path | None) -> str:
+    """The path of a file that is found again from wherever this scene, or a cache that keeps its text, is read."""
+    if "\0" in path:
+        raise InvalidInput(f"{what} = {path!r} is not allowed: no file has a name with a zero character")
+    return path if folder is None else str((folder / path).resolve())
 
 
 def _made_solver(value: Any) -> Solver | None:

@@ -94,6 +94,10 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
         list[_exactly(2, float)],  # type: ignore[misc]
         "a list of times and counts, such as [[0, 100], [0.5, 200]]",
     ),
+    "TriangleSource": (
+        str | list[list[Any]],
+        "the path of a file, or a pair of lists: places of vertices, and three of their numbers for each triangle",
+    ),
     "Vector": VECTOR,
     "Color": (str | float, "a colour, such as orange or #ffb454, or a temperature [K]"),
     "Curve": (

@@ -4,6 +4,7 @@ from pointmass.emitters.box import BoxEmitter
 from pointmass.emitters.chance import Normal, Spread
 from pointmass.emitters.emitter import Birth, Emitter, Parents
 from pointmass.emitters.line import LineEmitter
+from pointmass.emitters.mesh import MeshEmitter
 from pointmass.emitters.nozzle import Nozzle
 from pointmass.emitters.point import PointEmitter
 from pointmass.emitters.shaped import ShapedEmitter
@@ -15,6 +16,7 @@ EMITTERS: dict[str, type[Emitter]] = {
     "nozzle": Nozzle,
     "sphere": SphereEmitter,
     "box": BoxEmitter,
+    "mesh": MeshEmitter,
 }
 
 __all__ = [
@@ -23,6 +25,7 @@ __all__ = [
     "BoxEmitter",
     "Emitter",
     "LineEmitter",
+    "MeshEmitter",
     "Normal",
     "Nozzle",
     "Parents",

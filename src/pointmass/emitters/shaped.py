@@ -1,6 +1,6 @@
 """What emitters of all shapes have in common: when, in which directions, how fast, for how long.
 
-A shape says where, and what the normal is there: see `point`, `line`, `nozzle`, `sphere`, `box`.
+A shape says where, and what the normal is there: see `point`, `line`, `nozzle`, `sphere`, `box`, `mesh`.
 """
 
 from __future__ import annotations
@@ -148,6 +148,11 @@ class ShapedEmitter(Emitter):
         u : four numbers in [0, 1) for each birth, shape (k, 4).
         """
 
+    def places(self, seed: int, stream: str, ids: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Places and normals of births, by their ids: `spot` of four numbers for each."""
+        u = [random.uniform(seed, stream, ids, purpose) for purpose in ("place", "place 2")]
+        return self.spot(np.concatenate(u, axis=1))
+
     # ------------------------------------------------------------------------------------------------ without parents
 
     def births(self, t0: float, t1: float, seed: int, stream: str) -> Birth:
@@ -178,8 +183,7 @@ class ShapedEmitter(Emitter):
 
     def _draw(self, ids: NDArray[np.int64], seed: int, stream: str, normals: Array | None = None) -> Draws:
         """Draws for births of some ids, where surfaces have these normals."""
-        u = [random.uniform(seed, stream, ids, purpose) for purpose in ("place", "place 2")]
-        place, own = self.spot(np.concatenate(u, axis=1))
+        place, own = self.places(seed, stream, ids)
         normal = own if normals is None else normals
         axis = normal if self._axis is None else np.broadcast_to(self._axis, place.shape)
         way = _within_cone(axis, self._edge, random.uniform(seed, stream, ids, "direction"))
