@@ -52,6 +52,18 @@ def test_flutter_has_no_jumps():
     assert np.abs(np.diff(u, axis=1)).max() < 6 * sqrt(8) / 0.5 * 1e-4
 
 
+def test_s05_the_variance_of_flutter_at_any_step():
+    """After 5 T it is s^2 for 1e5 walkers, and the step is not asked: h = T/10 and h = T give the same velocities."""
+    T, s = 0.4, 1.5
+    field = pm.Flutter((s, s, s), T, seed=5)
+    walkers = velocity(field, 5 * T, 100_000)
+    np.testing.assert_allclose(walkers.var(axis=0), s**2, rtol=0.03)
+    for steps in (50, 5):
+        sim = pm.Simulation(pm.ParticleSystem(pm.Particles(np.zeros((500, 3))), [field]), "euler", dt=5 * T / steps)
+        sim.step(steps)
+        np.testing.assert_allclose(sim.frame().velocities, walkers[:500], rtol=0, atol=1e-9)
+
+
 def test_the_displacement_of_flutter():
     T, s, t = 0.1, 0.8, 2.0
     times = (np.arange(200)[:, None] + 0.5) * t / 200
@@ -68,6 +80,15 @@ def test_mean_square_displacement_of_diffusion(solver):
     sim.step(40)
     # RK4 takes a sixth of each step from the next interval: 1/18 + 2 / 6 of one interval's share at either end
     assert (p.x**2).sum(axis=1).mean() == pytest.approx(6 * D * 40 * interval, rel=5 * sqrt(2 / 12_000) + 0.02)
+
+
+def test_s06_mean_square_displacement_of_many_walkers():
+    D, interval = 0.3, 0.05
+    p = pm.Particles(np.zeros((100_000, 3)))
+    sim = pm.Simulation(pm.ParticleSystem(p, [pm.Diffusion(D, interval, seed=2)]), "euler", dt=interval)
+    for _ in range(3):
+        sim.step(5)
+        assert (p.x**2).sum(axis=1).mean() == pytest.approx(6 * D * sim.t, rel=0.03)
 
 
 def test_diffusion_in_a_wind_is_the_same_after_a_while():
