@@ -7,7 +7,7 @@ made them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -154,8 +154,10 @@ class _Rehearsal:
 
     def begin(self, step: Span) -> None:
         """Find where those who are joined to others will be at the end of a step."""
+        p = self.system.particles
         if self.engine.coupled:
-            p = self.system.particles
+            self.met = _Met(p.x, p.v, np.zeros(0, np.intp), NO_IMPACTS)
+        if self.engine.coupled and len(p):
             with self.engine.rehearsal():
                 met = self._ahead(np.arange(len(p)), np.full(len(p), step.start), step)
                 self.met = replace(met, x=met.x.copy(), v=met.v.copy())
@@ -182,7 +184,7 @@ class _Rehearsal:
     def _added(self, newborn: Birth, ids: NDArray[np.int64], awaited: NDArray[np.bool_]) -> Rows:
         """Rows of the newborn, -1 for those who need not go along."""
         rows = np.full(len(awaited), -1)
-        if self.met is None and awaited.any():
+        if awaited.any():
             rows[awaited] = len(self.system.particles) + np.arange(int(awaited.sum()))
             columns = {name: np.broadcast_to(c, len(awaited))[awaited] for name, c in newborn.columns.items()}
             lifetime = newborn.lifetime[awaited]
@@ -190,28 +192,41 @@ class _Rehearsal:
         return rows
 
     def _gone(self, parents: Parents, rows: Rows, awaited: NDArray[np.bool_], step: Span) -> Parents:
-        """Parents who have gone their ways, those that are awaited. Where particles act on each other, the newborn go
-        straight, and meet nothing."""
-        p, still, goes = self.system.particles, parents.paths, awaited & (rows >= 0)
+        """Parents who have gone their ways, those that are awaited.
+
+        The newborn on whom others act go straight, and meet nothing.
+        """
+        p, still, dead = self.system.particles, parents.paths, np.zeros(len(rows), bool)
         x0, v0 = still.x0, still.v0
         x1, v1 = x0 + still.h[:, None] * v0, v0.copy()
-        met, impacts, dead = self.met, NO_IMPACTS, np.zeros(len(rows), bool)
-        if met is None and goes.any():
-            births = np.full(len(p), step.start)
-            births[rows[goes]] = still.t0[goes]
-            met = self._ahead(np.sort(rows[goes]), births, step)
-        if met is not None:
+        impacts: list[Impacts] = []
+        for goes, met in self._ways(rows, awaited, still.t0, step):
             x1[goes], v1[goes] = met.x[rows[goes]], met.v[rows[goes]]
             dead[goes] = np.isin(rows[goes], met.died)
             dead |= goes & killed(self.lineage.zones, x1, step.end, still.t0 < step.end)
             whose = np.full(len(p), -1)
             whose[rows[goes]] = np.flatnonzero(goes)
             mine = met.impacts.take(whose[met.impacts.rows] >= 0)
-            impacts = Impacts.of([replace(mine, rows=whose[mine.rows])])
+            impacts.append(replace(mine, rows=whose[mine.rows]))
         if self.system.order == 1:
             v0 = v1 = (x1 - x0) / np.where(still.h > 0, still.h, 1)[:, None]
         death = np.where(dead, np.minimum(parents.death, step.end), parents.death)
-        return replace(parents, death=death, paths=replace(still, v0=v0, x1=x1, v1=v1), impacts=impacts)
+        return replace(parents, death=death, paths=replace(still, v0=v0, x1=x1, v1=v1), impacts=Impacts.of(impacts))
+
+    def _ways(
+        self, rows: Rows, awaited: NDArray[np.bool_], clock: Array, step: Span
+    ) -> Iterator[tuple[NDArray[np.bool_], _Met]]:
+        """Which parents go where: those whom everybody's step has shown, and those that go by themselves."""
+        goes = awaited & (rows >= 0)
+        if self.met is not None:
+            known = goes & (rows < len(self.met.x))
+            yield known, self.met
+            goes &= ~known
+            goes[goes] = self.engine.alone(rows[goes])
+        if goes.any():
+            births = np.full(len(self.system.particles), step.start)
+            births[rows[goes]] = clock[goes]
+            yield goes, self._ahead(np.sort(rows[goes]), births, step)
 
     def _ahead(self, rows: Rows, births: Array, step: Span) -> _Met:
         """Take some particles over a step."""

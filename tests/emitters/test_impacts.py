@@ -94,8 +94,8 @@ def test_only_fast_impacts_count_relative_to_the_surface():
 
     def count(above):
         floor = pm.Plane((0, "t", 0), restitution=0.5)
-        sim = simulation([*drops(speed=3.0), splash(above=above, speed=5.0)], [floor], dt=0.01)
-        sim.step(250)
+        sim = simulation([*drops(speed=3.0), splash(above=above, speed=5.0)], [floor], dt=0.02)
+        sim.step(70)
         return children(sim).sum()
 
     t = (-4 + np.sqrt(16 + 2 * G)) / G
@@ -190,17 +190,36 @@ def test_every_solver_takes_them(name):
 
 @both
 @pytest.mark.usefixtures("plain")
-def test_where_particles_act_on_each_other(compiled):
-    """Two balls on a spring hit the floor one after the other; others fall beside them."""
-    emitters = [*drops([1.0, 0.6]), splash("drop 0"), splash("drop 1")]
+def test_beside_particles_that_act_on_each_other(compiled):
+    """Three drops beside two balls on a spring; one hits the floor in the step of its birth."""
+    heights = np.array([1.5, 1.0, 0.03])
+    emitters = [*drops(heights, speed=3), *(splash(f"drop {k}") for k in range(3))]
     p = pm.Particles([[5, 3, 0], [6, 3, 0]])
-    springs = pm.Springs([(0, 1)], 10.0)
-    system = pm.ParticleSystem(p, [pm.Gravity(), springs], [pm.Plane(restitution=0)])
+    system = pm.ParticleSystem(p, [pm.Gravity(), pm.Springs([(0, 1)], 10.0)], [pm.Plane(restitution=0)])
     sim = pm.Simulation(system, "leapfrog", 1 / 60, emitters=emitters, compiled=compiled)
+    for steps in (10, 12):
+        sim.step(steps)
+        late = sim.t - (np.sqrt(9 + 2 * G * heights) - 3) / G
+        y = (2 * late - G * late**2 / 2)[late > 0]
+        np.testing.assert_allclose(np.sort(p.x[children(sim)][:, 1]), np.sort(y), atol=1e-9)
+
+
+@both
+@pytest.mark.usefixtures("plain")
+def test_of_particles_that_act_on_each_other(compiled):
+    """Two balls of which each is the other's neighbour by law; what it does is nothing, so they fall freely."""
+    emitters = [*drops([1.0, 0.6]), splash(), splash("drop 1")]
+    forces = [pm.Gravity(), pm.SoftSphere(k_s=0.0)]
+    sim = simulation(emitters, [pm.Plane(restitution=0)], compiled=compiled, forces=forces)
     sim.step(32)
-    born = children(sim)
     late = sim.t - np.sqrt(2 * np.array([1.0, 0.6]) / G)
-    np.testing.assert_allclose(system.particles.x[born][:, 1], (2 * late - G * late**2 / 2)[::-1], atol=1e-9)
+    p, born = sim.system.particles, children(sim)
+    assert born.sum() == 2
+    np.testing.assert_allclose(np.sort(p.age[born]), late, atol=1e-4)
+    # the newborn have come along a straight line from where their step began, and felt its whole pull
+    np.testing.assert_allclose(
+        np.sort(p.x[born][:, 1]), np.sort(2 * late - G * late**2 / 2), atol=G / 60 * late.max() + G / 60**2
+    )
 
 
 @both

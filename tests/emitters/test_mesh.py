@@ -100,7 +100,7 @@ def test_a_tetrahedron_is_filled_evenly():
     [
         trimesh.creation.torus(1.0, 0.3, major_sections=48, minor_sections=24),
         trimesh.creation.icosphere(subdivisions=3, radius=0.7),
-        trimesh.creation.annulus(0.5, 0.55, 2.0),
+        trimesh.creation.annulus(0.5, 0.55, 2.0, sections=16),
         hollow(),
     ],
     ids=["torus", "ball", "thin tube", "hollow box"],

@@ -91,7 +91,8 @@ class ShapedEmitter(Emitter):
         the age of the parent instead of t.
     count : children of each parent at its death or birth, or of each of its impacts; a mean is rounded up or down by
         chance. 100 by default.
-    above : speed into the surface, along its normal, from which on an impact makes children [m/s], at least 0.
+    above : speed into the surface, along its normal, from which on an impact makes children [m/s], at least 0; what
+        comes to rest touches slowly, again and again.
     """
 
     position: Vector = (0.0, 0.0, 0.0)
@@ -113,7 +114,7 @@ class ShapedEmitter(Emitter):
     of: str = ""
     on: Event = "death"
     count: Chance | None = None
-    above: float = 0.0
+    above: float = 0.3
 
     def __post_init__(self) -> None:
         self._motion = Motion(self.position, "position")

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from pointmass.emitters.emitter import Array
 from pointmass.meshes import TriangleMesh
 
-MOST_COLUMNS = 256  # along an axis
-PAIRS = 2**22  # of places and triangles that are looked at in one go
+COLUMNS = 16, 256  # least and most along an axis
+PAIRS = 2**22  # of places or columns and triangles that are looked at in one go
 
 
 class Solid:
@@ -26,13 +26,14 @@ class Solid:
     def __init__(self, mesh: TriangleMesh) -> None:
         corners = mesh.corners
         low, high = corners.min(axis=1), corners.max(axis=1)
-        side = int(np.clip(np.sqrt(len(corners)), 1, MOST_COLUMNS))
         self._origin = low.min(axis=0)[[0, 2]]
-        self._cell = (high.max(axis=0)[[0, 2]] - self._origin) / side
-        first, last = (np.clip(self._cells(p[:, [0, 2]]), 0, side - 1) for p in (low, high))
-        first, last = np.maximum(first - 1, 0), np.minimum(last + 1, side - 1)  # whatever was rounded
-        wide = last - first + 1
-        count = wide.prod(axis=1)
+        self._extent = high.max(axis=0)[[0, 2]] - self._origin
+        self._side = int(np.clip(4 * np.sqrt(len(corners)), *COLUMNS))
+        first, wide = self._under(low, high)
+        while wide.prod(axis=1).sum() > PAIRS and self._side > 1:  # large triangles are over many columns
+            self._side //= 2
+            first, wide = self._under(low, high)
+        side, count = self._side, wide.prod(axis=1)
         triangle = np.repeat(np.arange(len(corners)), count)
         k = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
         column = (first[triangle, 0] + k // wide[triangle, 1]) * side + first[triangle, 1] + k % wide[triangle, 1]
@@ -43,12 +44,18 @@ class Solid:
         np.minimum.at(bottom, column, low[triangle, 1])
         np.maximum.at(top, column, high[triangle, 1])
         height = np.where(top > bottom, top - bottom, 0.0)
-        self._side, self._bottom, self._height, self._before = side, bottom, height, np.cumsum(height)
-        self.filled = abs(mesh.volume) / float(self._before[-1] * self._cell.prod())
+        self._bottom, self._height, self._before = bottom, height, np.cumsum(height)
+        self.filled = abs(mesh.volume) / float(self._before[-1] * self._extent.prod() / side**2)
         self._prepare(corners)
 
+    def _under(self, low: Array, high: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """The first column under each triangle, and how many there are, along both axes, shape (k, 2)."""
+        first, last = (np.clip(self._cells(p[:, [0, 2]]), 0, self._side - 1) for p in (low, high))
+        first, last = np.maximum(first - 1, 0), np.minimum(last + 1, self._side - 1)  # whatever was rounded
+        return first, last - first + 1
+
     def _cells(self, places: Array) -> NDArray[np.intp]:
-        cells: NDArray[np.intp] = np.floor((places - self._origin) / self._cell).astype(np.intp)
+        cells: NDArray[np.intp] = np.floor((places - self._origin) / self._extent * self._side).astype(np.intp)
         return cells
 
     def _prepare(self, corners: Array) -> None:
@@ -65,8 +72,8 @@ class Solid:
         """Places that are even over the columns, from four numbers in [0, 1) each, shape (k, 4)."""
         spot = u[:, 3] * self._before[-1]
         column = np.minimum(np.searchsorted(self._before, spot, side="right"), len(self._before) - 1)
-        corner = self._origin + np.stack([column // self._side, column % self._side], axis=1) * self._cell
-        x, z = (corner + u[:, [0, 2]] * self._cell).T
+        corner = np.stack([column // self._side, column % self._side], axis=1)
+        x, z = (self._origin + (corner + u[:, [0, 2]]) / self._side * self._extent).T
         return np.stack([x, self._bottom[column] + u[:, 1] * self._height[column], z], axis=1)
 
     def holds(self, x: Array) -> NDArray[np.bool_]:

@@ -188,9 +188,9 @@ class Engine:
 
     @property
     def coupled(self) -> bool:
-        """Whether particles act on each other: births and deaths then end a span."""
+        """Whether particles act on each other, or will once there are some: births and deaths then end a span."""
         islands = self.system.island_of_particle
-        return len(islands) > 0 and int(islands.max()) + 1 < len(islands)
+        return self._pairs or (len(islands) > 0 and int(islands.max()) + 1 < len(islands))
 
     @property
     def deadly(self) -> bool:
@@ -296,8 +296,14 @@ class Engine:
             p.x[:], p.v[:], system.t = x, v, t
             self.reference.leave(left)
 
+    def alone(self, rows: Rows) -> NDArray[np.bool_]:
+        """Which of some particles nobody acts on."""
+        islands = self.system.island_of_particle
+        result: NDArray[np.bool_] = np.bincount(islands)[islands[rows]] == 1
+        return result
+
     def ahead(self, rows: Rows, step: Span, births: Array, compiled: bool) -> None:
-        """Take some particles over one step, and those that they are joined to; for a `rehearsal`.
+        """Take some particles over one step; all of them, if some are joined to each other. For a `rehearsal`.
 
         `died` and `impacts` tell then what became of them.
 
@@ -312,17 +318,18 @@ class Engine:
             Something goes wrong on the way.
         """
         self.died, self._hit = self.died[:0], self._hit[:0]
+        apart = bool(self.alone(rows).all())
         if not compiled:
-            waits = np.full(len(births), not self.coupled)
+            waits = np.full(len(births), apart)
             waits[rows] = False
             self.reference.step(step.start, step.end, np.where(waits, step.end, births))
             self.died, self.impacts = self.reference.died, self.reference.impacts
             return
-        if self.coupled:
-            groups = self._grouped(births, step.start)
-        else:
+        if apart:
             kind, how = (SinglesKernel, True) if _by_lanes(self.solver) else (IslandKernel, False)
             groups = [self._made(kind, rows, self.system.island_of_particle, how)]
+        else:
+            groups = self._grouped(births, step.start)
         self._keep()
         left = self.reference.left()
         if not self._launch(step, births, groups):
