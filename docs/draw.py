@@ -215,6 +215,11 @@ def splashes():
     save("splashes", *of_page("splashes"))
 
 
+def planet():
+    """Attractors of docs/scenes.md."""
+    save("planet", *of_page("planet"))
+
+
 def snow():
     """Flakes of docs/scenes.md."""
     save("snow", *of_page("snow"))
@@ -289,6 +294,7 @@ PICTURES = (
     sparks,
     smoke,
     splashes,
+    planet,
     snow,
     curl_noise,
     pendulum,
