@@ -145,10 +145,12 @@ class IslandKernel:
         """Whether it tells who hits a surface."""
         return self._watched and self.impacts is not None
 
-    def marked(self, hit: NDArray[np.uint8]) -> NDArray[np.bool_]:
-        """Whom marks say to have hit a surface; there are none for the lecture's test at the end of a step."""
+    def marked(self, hit: NDArray[np.uint8]) -> Rows:
+        """Who has hit a surface by its mark, or may have: the lecture's test at the end of a step leaves none."""
         contact = self.deriv.contact
-        return np.full(len(hit), self.watched) if contact is not None and contact.discrete else hit > 0
+        if not self.watched:
+            return np.zeros(0, np.intp)
+        return np.arange(len(hit)) if contact is not None and contact.discrete else np.flatnonzero(hit)
 
     @property
     def work(self) -> list[str]:

@@ -474,5 +474,5 @@ class SingleMembers:
         spread(lambda lo, hi: kernel(lo, hi, *arrays, *scratch([1])), tiles, GRAIN)
         work = Stats(span.count, 0, span.count * motion.evaluations)
         far = reach.max(axis=0).astype(np.float64)
-        touched = hit > 0 if island is None else island.marked(hit)
-        return Outcome(not status.any(), far, work, died=self.rows[died > 0], hit=self.rows[touched])
+        touched = self.rows[:0] if island is None else self.rows[island.marked(hit)]
+        return Outcome(not status.any(), far, work, died=self.rows[died > 0], hit=touched)
