@@ -56,6 +56,9 @@ class Lineage:
     Attributes
     ----------
     order : numbers of the emitters, those that are followed before those that follow them.
+    taken, spared : ids of the parents that die before their time in the span that was foreseen last, and of others that
+        do not. Where particles act on each other, the newborn turn the step a little from its rehearsal: what that has
+        shown is then what counts, so that who dies has children, and once.
 
     Raises
     ------
@@ -84,6 +87,7 @@ class Lineage:
         self.followed = {p: [k for k in self.parent if self.parent[k] == p] for p in set(self.parent.values())}
         nobody = Kin(np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
         self.kin = dict.fromkeys(self.followed, nobody)
+        self.taken = self.spared = nobody.ids
 
     def settle(self, born: Sequence[Sequence[Birth]], t: float) -> None:
         """Know who was born, and forget who is dead by a time."""
@@ -112,6 +116,7 @@ class Lineage:
         Diverged
             A parent goes astray.
         """
+        self.taken = self.spared = self.taken[:0]
         if not any(len(self.kin[k].ids) or any(len(step[k].number) for step in born) for k in self.kin):
             return born
         with engine.rehearsal():
@@ -211,6 +216,9 @@ class _Rehearsal:
         if self.system.order == 1:
             v0 = v1 = (x1 - x0) / np.where(still.h > 0, still.h, 1)[:, None]
         death = np.where(dead, np.minimum(parents.death, step.end), parents.death)
+        self.lineage.taken = np.append(self.lineage.taken, parents.ids[dead])
+        if self.met is not None:
+            self.lineage.spared = np.append(self.lineage.spared, parents.ids[awaited & ~dead])
         return replace(parents, death=death, paths=replace(still, v0=v0, x1=x1, v1=v1), impacts=Impacts.of(impacts))
 
     def _ways(

@@ -346,12 +346,13 @@ class Simulation:
             self._death = np.concatenate([self._death, *(birth.death for _, birth in new)])
         self._lineage.settle(born, t1)
         p, dead = self.system.particles, self._death <= t1
-        rows = p.rows(self._mortal[dead])
-        gone = np.zeros(len(p), bool)
-        gone[rows[rows >= 0]] = True
+        rows = p.rows(np.append(self._mortal[dead], self._lineage.taken))
+        gone = killed(self.zones, p.x, t1, p.age > 0)
         gone[self.engine.died] = True
+        spared = p.rows(self._lineage.spared)
+        gone[spared[spared >= 0]] = False
+        gone[rows[rows >= 0]] = True
         self._mortal, self._death = self._mortal[~dead], self._death[~dead]
-        gone |= killed(self.zones, p.x, t1, p.age > 0)
         if gone.any():
             self.system.remove(gone)
         if self.max_particles is not None and len(p) > self.max_particles:

@@ -285,6 +285,27 @@ def test_who_stays_in_a_zone_dies_with_all_its_generations(compiled):
     assert counts == [6, 12, 24, 0, 0, 0]
 
 
+def test_among_particles_that_push_each_other_nobody_has_children_twice():
+    """Newborn balls turn the steps of others from their rehearsals; at the zone's edge that makes the difference."""
+    emitters = [
+        pm.PointEmitter((0, 1, 0), rate=300, speed=2, direction=(0, -1, 0), cone=5, size=0.06, mass=0.01, name="a"),
+        pm.PointEmitter(of="a", count=1, speed=2, inherit=0, lifetime=0.05, attributes={"child": 1.0}),
+    ]
+    system = pm.ParticleSystem(pm.Particles(np.zeros((0, 3))), [pm.Gravity(), pm.SoftSphere(k_s=200.0)])
+    zones = [pm.HalfSpaceZone((0, 0.9, 0))]
+    sim = pm.Simulation(system, "leapfrog", 1 / 240, emitters=emitters, zones=zones, compiled=False)
+    p, before, parents, born = system.particles, set(), set(), set()
+    for _ in range(120):
+        sim.step()
+        child = p.attributes["child"] > 0
+        born |= set(p.id[child].tolist())
+        now = set(p.id[~child].tolist())
+        parents |= before - now
+        before = now
+    assert len(parents) > 80
+    assert len(born) == len(parents)
+
+
 def test_both_paths_and_any_frame_rate_agree_on_the_dead():
     def run(compiled, fps):
         sim = rain(compiled, response="kill", rate=60)
