@@ -7,22 +7,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from pointmass.bodies import scatter
 from pointmass.collisions import Plane
 from pointmass.emitters import Nozzle, Spread
 from pointmass.forces import CurlNoise, Flow, Gravity, Wind
 from pointmass.frame import Camera, Frame
+from pointmass.laws.formula import Formula
 from pointmass.look import Look
 from pointmass.scene import Scene
-from pointmass.scenes.base import ShippedScene, knob
+from pointmass.scenes.base import ShippedScene, expect, knob
 from pointmass.solvers import SymplecticEuler
 
 SECONDS = 8.0  # length of the film; the whirl is in the middle of the ground at half of it
-DUST, SAND = 1e-6, 4e-6  # mass of a grain [kg]; all have the same drag, so sand falls four times as fast
+DUST, SAND = 1e-6, 6e-6  # mass of a grain [kg]; all have the same drag, so sand falls six times as fast
 UNEVEN = 0.4  # half-range of the drag of a grain, relative to its mean
 WIDER = 0.7  # how much wider the whirl is at its height than below, relative to its core
 PEAK = 0.638  # of (1 - exp(-r^2)) / r, the profile of the speed around (Lamb and Oseen)
 LEAN = 0.1  # tangent of the angle at which the column leans with the wind
+SLOW = 0.12  # thickness of the layer of slow air on the ground, relative to the height
+ROUGH = 0.7  # part of it that lies below the tops of the grains, so that the air takes hold of them
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,24 +36,21 @@ class Dust(ShippedScene):
 
     name = "dust"
     presets: ClassVar[dict[str, dict[str, Any]]] = {
-        "mars": {"gravity": 3.71, "height": 14.0, "core": 1.1, "updraft": 7.0, "swirl": 14.0, "fall": 0.4},
-        "eddy": {"height": 2.2, "core": 0.22, "updraft": 2.6, "swirl": 4.0, "wind": 0.35, "wander": 0.3},
-        "landspout": {"swirl": 22.0, "updraft": 11.0, "core": 0.9, "height": 9.0, "dust": 5000.0},
+        "mars": {"gravity": 3.71, "height": 12.0, "core": 0.9, "updraft": 14.0, "swirl": 11.0, "fall": 0.4},
+        "eddy": {"height": 2.2, "core": 0.22, "updraft": 2.6, "swirl": 4.0, "wind": 0.3, "wander": 0.3, "fall": 0.3},
+        "landspout": {"swirl": 15.0, "updraft": 15.0, "core": 0.7, "height": 9.0, "fall": 0.5, "dust": 5000.0},
     }
 
-    sand: int = knob(16000, "grains of sand that lie on the ground", low=10, high=1000000)
+    sand: int = knob(20000, "grains of sand that lie on the ground", low=10, high=1000000)
     dust: float = knob(4000.0, "puffs of dust that the whirl raises in a second", unit="1/s", low=1, high=1e6)
-    fall: float = knob(0.5, "speed at which sand falls in still air; dust, a quarter", unit="m/s", low=0.05, high=20)
-    swirl: float = knob(10.0, "highest speed of the air around the core", unit="m/s", low=0, high=100)
-    updraft: float = knob(8.0, "speed of the air upwards in the core", unit="m/s", low=0, high=100)
+    fall: float = knob(0.8, "speed at which sand falls in still air; dust, a sixth", unit="m/s", low=0.05, high=20)
+    swirl: float = knob(9.0, "highest speed of the air around the core", unit="m/s", low=0, high=100)
+    updraft: float = knob(8.5, "speed of the air upwards in the core", unit="m/s", low=0, high=100)
     core: float = knob(0.55, "radius of the core near the ground", unit="m", low=0.05, high=20)
     height: float = knob(6.0, "at which the whirl ends", unit="m", low=0.5, high=100)
-    wind: float = knob(0.7, "of the air, along x; it carries the whirl along", unit="m/s", low=-20, high=20)
+    wind: float = knob(0.6, "of the air, along x; it carries the whirl along", unit="m/s", low=-20, high=20)
     wander: float = knob(0.6, "how far the whirl strays from a straight way", unit="m", low=0, high=20)
-    turbulence: float = knob(0.7, "root mean square speed of small whirls", unit="m/s", low=0, high=20)
-    roughness: float = knob(
-        0.5, "share of the layer of slow air on the ground that grains stand out of", low=0.01, high=1
-    )
+    turbulence: float = knob(0.45, "root mean square speed of small whirls", unit="m/s", low=0, high=20)
     friction: float = knob(2.5, "of the ground; above 1, grains cling to it", low=0, high=10)
     gravity: float = knob(9.81, "gravity, downwards", unit="m/s^2", low=0.01, high=1000)
 
@@ -66,7 +68,7 @@ class Dust(ShippedScene):
         """Sand lies along the way of the whirl; dust begins below it."""
         stiffest = (1 + UNEVEN) * self.drag / DUST
         substeps = max(2, math.ceil(stiffest / 60))  # a step is at most as long as the air needs to stop a grain
-        air = CurlNoise(1.5 * self.core, 2 * self.turbulence, 0.8, octaves=2, seed=5)
+        air = CurlNoise(1.5 * self.core, 2 * self.turbulence, rate=0.0, octaves=1, seed=5)
         # Each of the two winds drags with a half of k, so each has twice its speed: the air is the sum of both.
         k = f"{0.5 * self.drag!r}*({1 - UNEVEN!r} + {2 * UNEVEN!r}*chance)"
         ground = (abs(self.wind) * SECONDS + 10 * self.core, 0.0, 2 * self.wander + 8 * self.core)
@@ -88,7 +90,7 @@ class Dust(ShippedScene):
                     speed=Spread(0.1 * self.updraft, 0.1 * self.updraft),
                     cone=60.0,
                     inherit=0.0,
-                    lifetime=Spread(3.2, 1.4),
+                    lifetime=Spread(2.8, 1.2),
                     mass=DUST,
                 )
             ],
@@ -113,8 +115,8 @@ class Dust(ShippedScene):
         """The air: up in the core, inwards below, outwards above, and around, without divergence; times a factor.
 
         With q = r^2 / R^2 and R the radius, which grows upwards, its stream function is Q (1 - exp(-q)) B, and
-        B = (1 - (1 + s) exp(-s)) exp(-(y/H)^4), s = y / depth: the air is at rest on the ground and high above H. Near
-        the ground, where B ~ y^2, this is the vortex of Burgers and Rott with a layer of slow air below it.
+        B = (1 - (1 + s) exp(-s)) exp(-(y/H)^4), s = (y + a) / d: the air is at rest at y = -a and high above H, and
+        at its foot the vortex of Burgers and Rott over a layer of slow air, in which the grains stand up to a.
         """
         x, z, wide = f"(x-cx-{LEAN}*y)", "(z-cz)", "(R+w*y)"
         q = f"(({x}**2+{z}**2)/{wide}**2)"
@@ -125,7 +127,7 @@ class Dust(ShippedScene):
         around = f"S*R*{swept}*{lift}/{wide}**2"
         up = f"W*R**2*exp(-{q})*{lift}/{wide}**2"
         inward = f"W*R**2*(w*exp(-{q})*{lift}/{wide}**3-0.5*{swept}*{growth}/{wide}**2)"
-        depth = 0.12 * self.height
+        depth = SLOW * self.height
         return Flow(
             (
                 f"{inward}*{x}+{around}*{z}+{LEAN}*{up}+U*(1-exp(-{s}))",
@@ -139,7 +141,7 @@ class Dust(ShippedScene):
                 "w": WIDER * self.core / self.height,
                 "H": self.height,
                 "d": depth,
-                "a": self.roughness * depth,
+                "a": ROUGH * depth,
                 "S": factor * self.swirl / PEAK,
                 "W": factor * self.updraft,
                 "U": factor * self.wind,
@@ -147,4 +149,35 @@ class Dust(ShippedScene):
         )
 
     def check(self, frames: Sequence[Frame]) -> None:
-        """x"""
+        """Nobody is in the ground or faster than the air; sand lies still far away, and what flies turns and rises."""
+        last, before = frames[-1], frames[-2]
+        lowest = float(last.positions[:, 1].min())
+        expect(lowest > -1e-3, f"a grain sank {-lowest:.2g} m into the ground")
+        speed = float(np.linalg.norm(last.velocities, axis=1).max())
+        inflow = self.updraft * self.core / self.height  # the highest, by the stream function
+        gale = math.hypot(self.swirl, self.updraft) + inflow + abs(self.wind) + 7 * self.turbulence
+        most = 1.3 * gale + (1 + UNEVEN) / (1 - UNEVEN) * self.fall
+        expect(speed <= most, f"a grain has {speed:.2f} m/s, and the air can give it {most:.2f} m/s")
+        sand = last.ids < self.sand  # it never dies, and has the same rows in every frame
+        expect(sand.sum() == self.sand, f"{sand.sum()} grains of sand are left of {self.sand}")
+        x = last.positions - self._foot(last.time)
+        far = np.flatnonzero(sand & (np.hypot(x[:, 0], x[:, 2]) > 6 * self.core))
+        holds = self.friction * self.fall * (1 - UNEVEN)  # speed of the air on the ground that moves no grain
+        gentle = self.turbulence + (1 - math.exp(-ROUGH)) * abs(self.wind) + 0.02 * self.swirl
+        if len(far) > 100 and holds > gentle:
+            still = (last.positions[far] == before.positions[far]).all(axis=1).mean()
+            expect(still > 0.5, f"only {100 * still:.0f} % of the sand far away lies still, and not most of it")
+        flies = ~sand & (x[:, 1] > 0.1 * self.height) & (x[:, 1] < 0.8 * self.height)
+        if last.time > 1.5 and flies.sum() > 100:
+            x, v = x[flies], last.velocities[flies] - (self.wind, 0.0, 0.0)
+            if self.swirl > 4 * (self.turbulence + abs(self.wind)):
+                turn = float((x[:, 2] * v[:, 0] - x[:, 0] * v[:, 2]).mean())
+                expect(turn > 0, f"the dust has {turn:.3g} m^2/s about the whirl: it turns the wrong way")
+            if self.updraft > 4 * (self.turbulence + self.fall):
+                rise = float(v[:, 1].mean())
+                expect(rise > 0, f"the dust rises at {rise:.3g} m/s in an updraft of {self.updraft} m/s")
+
+    def _foot(self, t: float) -> tuple[float, float, float]:
+        """Where the whirl stands on the ground at t [m]."""
+        x, z = (Formula(way, ("t",))({"t": t}) for way in self.way)
+        return x, 0.0, z
