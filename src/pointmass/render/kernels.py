@@ -291,18 +291,19 @@ def _ball_smeared(c, box, area, tile, count, camera):
     """A ball on its way covers a place for the share of the time in which it lies over it.
 
     A disc on a straight way lies over a point for as long as the disc's chord through the point is, along the way; the
-    sum over all points is the disc's area. Each pixel takes the mean of STRIPS such lines. It shows the mean of what the
-    ball shows at two moments of that time, those of Gauss's quadrature.
+    sum over all points is the disc's area. Each pixel takes the mean of STRIPS such lines. It shows the mean of what
+    the ball shows at two moments of that time, those of Gauss's quadrature.
     """
     w = ONE / c[2]
     radius = camera[0] * w * c[3]
     size = max(radius, ONE)
     sharp = c[2] * c[2] / c[3]
     x, y = camera[1] + camera[0] * w * c[0], camera[2] - camera[0] * w * c[1]
-    length = math.sqrt(c[9] * c[9] + c[10] * c[10])
+    square = c[9] * c[9] + c[10] * c[10]
+    length = math.sqrt(square)
     ux, uy = c[9] / length, c[10] / length
-    length = max(length, ONE)  # or its edges would be jagged
-    strength = c[7] * (radius / size) * (radius / size) / (np.float32(STRIPS) * length)
+    reach = math.sqrt(max(square, ONE))  # of its way: one that is shorter has jagged edges
+    strength = c[7] * (radius / size) * (radius / size) / (np.float32(STRIPS) * reach)
     left, right, first, last = _cut(box, area)
     for row in range(first, last):
         start = _place(row, area)
@@ -315,7 +316,7 @@ def _ball_smeared(c, box, area, tile, count, camera):
             for k in range(STRIPS):
                 off = across + (np.float32(k) + HALF) / np.float32(STRIPS) - HALF
                 chord = math.sqrt(max(size * size - off * off, ZERO))
-                begin, end = max(along - chord, -HALF * length), min(along + chord, HALF * length)
+                begin, end = max(along - chord, -HALF * reach), min(along + chord, HALF * reach)
                 if end > begin:
                     covered += end - begin
                     moment += HALF * (end - begin) * (end + begin)
