@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import pointmass as pm
 from benchmarks import page, race, track
 from benchmarks.probe import Machine, probe
 from benchmarks.toolchain import compiled
@@ -195,6 +196,16 @@ def test_the_melt_follows_newtons_law() -> None:
         pytest.skip(str(reason))
     contestant.frame()
     assert judge.error(np.asarray(contestant.result())) < 1e-10
+
+
+def test_the_air_of_the_race_of_births_is_that_of_curl_noise() -> None:
+    p = EMIT()
+    x = p.x[:300].astype(np.float64)
+    air = pm.CurlNoise(p.length, p.speed, rate=0.0, octaves=1, seed=p.seed)
+    particles = pm.Particles(x)
+    air.bind(particles)
+    air.add_forces(particles, 0.0, particles.x, particles.v, particles.f)
+    np.testing.assert_allclose(emit.flow(p, x), particles.f, atol=1e-12)
 
 
 WRONG = [

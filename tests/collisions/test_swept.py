@@ -99,9 +99,7 @@ def test_who_bounces_off_a_ball_flies_on(compiled, dtype):
     v = 0.9 * random.normal(size=out.shape) - out
     toward = -(v * out).sum(axis=1)
     out, v, toward = out[toward > 0.2], v[toward > 0.2], toward[toward > 0.2]
-    x = (
-        center + out * (0.8 + random.uniform(0, 0.009, len(out)) * toward)[:, None]
-    )  # they hit within a step
+    x = center + out * (0.8 + random.uniform(0, 0.009, len(out)) * toward)[:, None]  # they hit within a step
     ball = pm.Sphere(center, 0.8, restitution=0.5, friction=0.0)
     system = pm.ParticleSystem(pm.Particles(x, v, dtype=dtype), [pm.Drag(0.1)], ball)
     sim = pm.Simulation(system, pm.SymplecticEuler(), dt=0.01, compiled=compiled)
