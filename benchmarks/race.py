@@ -1,4 +1,4 @@
-"""Races against peers, one for each workload: `python -m benchmarks.race free|cloth|hair|pairs|implicit|start|all`.
+"""Races against peers, one for each workload: `python -m benchmarks.race free|cloth|...|all`, `--help` for their names.
 
 Everybody does equal work in turns, in processes of their own (track.py), and only the right answer counts. Above the
 tables of a workload stands what the machine can do (probe.py). `pip install pointmass[race]` brings the peers; who is
@@ -17,7 +17,7 @@ from benchmarks.page import Table, section, tables, write
 from benchmarks.probe import Machine, probe
 from benchmarks.track import run
 
-WORKLOADS = ("free", "cloth", "hair", "pairs", "implicit", "start")
+WORKLOADS = ("free", "cloth", "hair", "pairs", "implicit", "emit", "start")
 
 
 @click.command()

@@ -270,6 +270,11 @@ def smoke_scene():
     shipped("smoke", 355)
 
 
+def dust():
+    """The shipped scene dust."""
+    shipped("dust", 300)
+
+
 def curl_noise():
     """Stripes of dust, carried around a ball by curl noise for a second."""
     ball = pm.Sphere(radius=0.35)
@@ -306,6 +311,7 @@ PICTURES = (
     fireworks,
     snow_scene,
     smoke_scene,
+    dust,
 )
 
 

@@ -164,6 +164,17 @@ def test_a_streak_is_the_way_since_the_shutter_opened_or_the_birth() -> None:
     np.testing.assert_allclose(points.motion, [[0, 3, 0]] * 3, rtol=1e-6)
 
 
+def test_in_a_flow_the_shutter_and_the_colours_know_the_speed_of_the_field() -> None:
+    p = pm.Particles([[1.0, 0, 0], [0, 2.0, 0]])
+    look = pm.Look(shutter=0.25, color_by="speed", color_range=(0.0, 6.0))
+    system = pm.ParticleSystem(p, [pm.Flow(("-3*y", "3*x", "0"))])
+    sim = pm.Simulation(system, look=look, dt=1.0, compiled=False)
+    p.age[:] = 1.0
+    (points,) = of_kind(sim.frame(), Points)
+    np.testing.assert_allclose(points.motion, [[0, 0.75, 0], [-1.5, 0, 0]], rtol=1e-6)
+    np.testing.assert_allclose(points.color[:, :3], palette("fire", np.array([0.5, 1.0]))[:, :3], rtol=1e-6)
+
+
 def test_groups_look_otherwise() -> None:
     p = pm.Particles(np.arange(15.0).reshape(5, 3), hot=[0, 0, 1, 1, 0], radius=0.1, red=1, green=0, blue=0)
     p.tag("smoke", [0, 3])

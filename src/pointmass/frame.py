@@ -35,7 +35,8 @@ class Points:
     glow : True: soft light that adds to what lies behind; False: an opaque shaded ball.
     soft : True: a translucent puff of smoke, thick in the middle, through which light comes to others.
     motion : the way that each went while the shutter was open [m], shape (k, 3): a glow's light is spread evenly over
-        it, and a disc is smeared along it. None = a moment.
+        it, a disc is smeared along it, and a ball hides what it passes for the share of the time in which it is there;
+        its shadow is that of the middle. Puffs have none. None = a moment.
     normals : the balls are thin discs across these directions, shape (k, 3).
     daylight : factor on the light of the picture's lamps on puffs and discs; what glows lights them, too.
     """

@@ -70,8 +70,8 @@ class Look:
         palette: colours instead of `color`, on which `color_by` and particles' own colours are factors.
     groups : other looks for some particles, by the name of a group, or of an attribute that is not 0 for them; tables
         of what is said here of particles. Who is in several has the first.
-    shutter : exposure time [s]: a glowing particle is a streak as long as the way that it went meanwhile, and as much
-        dimmer, and a flake is smeared; 0 = none. Films have half the time between two frames.
+    shutter : exposure time [s], 0 = a moment: a glowing particle is a streak as long as the way that it went meanwhile,
+        and as much dimmer; a ball or a flake is smeared along its way. Films have half the time between two frames.
     springs : whether springs are drawn, as lines of `spring_width` [m] (None = 0.3% of the scene) and `spring_color`
         (None = by family).
     trails : length of the particles' trails [s], 0 = none.

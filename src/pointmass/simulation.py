@@ -196,13 +196,14 @@ class Simulation:
         p = system.particles
         x, v = system.split(self.engine.state_at(now)) if now < self.t else (p.x, p.v)
         self._stage.trails.remember(now, p.id, x)
+        v = self._velocities(now, x, v)
         drawables = self.look.drawables(system, now, x, v, number, self._stage)
         return Frame(
             number=number,
             time=now,
             ids=p.id.copy(),
             positions=x.copy(),
-            velocities=self._velocities(now, x, v),
+            velocities=v,
             drawables=drawables,
             quantities=self.quantities(),
         )

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import pointmass as pm
 from benchmarks import page, race, track
 from benchmarks.probe import Machine, probe
 from benchmarks.toolchain import compiled
-from benchmarks.workloads import free, hair, implicit, pairs, springs
+from benchmarks.workloads import emit, free, hair, implicit, pairs, springs
 from benchmarks.workloads.cloth import cloth, irregular
 
 MACHINE = Machine("a machine", 2, 4e9, {"float32": (64e9, 128e9), "float64": (32e9, 64e9)}, (20e9, 40e9))
@@ -154,6 +155,7 @@ def test_without_a_compiler_c_is_left_out(monkeypatch: pytest.MonkeyPatch) -> No
 
 FREE = partial(free.Problem, 300, substeps=32)
 RK4 = partial(free.Problem, 300, solver="rk4", mu=2.0)
+EMIT = partial(emit.Problem, 20_000)
 CLOTH, MESH, HAIR = partial(cloth, 8), partial(irregular, 8), partial(hair.hair, 3)
 HERE = [
     *((free, FREE, kind) for kind in (free.Pointmass, free.PointmassDiscrete, free.NumPy, free.NumPyBlocks)),
@@ -163,6 +165,7 @@ HERE = [
     (springs, HAIR, hair.NumPyStrands),
     *((pairs, partial(pairs.Bodies, 200), kind) for kind in (pairs.Pointmass, pairs.NumPy, pairs.C)),
     *((implicit, partial(implicit.drum, 8), kind) for kind in implicit.CONTESTANTS),
+    *((emit, EMIT, kind) for kind in (emit.Pointmass, emit.PointmassDiscrete, emit.NumPy, emit.NumPyBlocks)),
 ]
 
 
@@ -195,6 +198,16 @@ def test_the_melt_follows_newtons_law() -> None:
     assert judge.error(np.asarray(contestant.result())) < 1e-10
 
 
+def test_the_air_of_the_race_of_births_is_that_of_curl_noise() -> None:
+    p = EMIT()
+    x = p.x[:300].astype(np.float64)
+    air = pm.CurlNoise(p.length, p.speed, rate=0.0, octaves=1, seed=p.seed)
+    particles = pm.Particles(x)
+    air.bind(particles)
+    air.add_forces(particles, 0.0, particles.x, particles.v, particles.f)
+    np.testing.assert_allclose(emit.flow(p, x), particles.f, atol=1e-12)
+
+
 WRONG = [
     (free, FREE, {"k": 0.0}),
     (free, FREE, {"g": -9.5}),
@@ -207,6 +220,10 @@ WRONG = [
     (springs, HAIR, {"substeps": 15}),
     (pairs, partial(pairs.Bodies, 200), {"eps": 0.03}),
     (implicit, partial(implicit.drum, 8), {"k_s": 9.9}),
+    (emit, EMIT, {"k": 3.9}),
+    (emit, EMIT, {"restitution": 0.45}),
+    (emit, EMIT, {"seed": 4}),
+    (emit, EMIT, {"speed": 1.45}),
 ]
 
 
@@ -217,7 +234,9 @@ def test_a_wrong_contestant_is_caught(workload: ModuleType, make: partial, chang
 
     problem = make()
     judge = workload.judge(problem, "")
-    kind = {free: free.NumPy, springs: springs.NumPy, pairs: pairs.NumPy, implicit: implicit.SciPy}[workload]
+    kind = {emit: emit.NumPy, free: free.NumPy, springs: springs.NumPy, pairs: pairs.NumPy, implicit: implicit.SciPy}[
+        workload
+    ]
     contestant = kind(replace(problem, **change))
     contestant.frame()
     result = np.asarray(contestant.result(), np.float64)

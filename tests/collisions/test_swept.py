@@ -87,3 +87,24 @@ def test_who_starts_inside_may_leave_but_not_sink():
 def test_a_fast_floor_hits_a_resting_particle():
     floor = pm.Plane(point=(0, "-1 + 5*t", 0))
     assert first_hit(floor, path((0, 0, 0), (0, 0, 0), (0, 0, 0), (0, 0, 0)))[0] == pytest.approx(0.2, rel=1e-12)
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+@pytest.mark.parametrize("compiled", [False, None])
+def test_who_bounces_off_a_ball_flies_on(compiled, dtype):
+    """Nobody hits the ball again from a rounding inside it, where the bounce began, until it has had too many."""
+    random, center = np.random.default_rng(5), np.array([0.2, 0.1, -0.1])
+    out = random.normal(size=(3000, 3))
+    out /= np.linalg.norm(out, axis=1)[:, None]
+    v = 0.9 * random.normal(size=out.shape) - out
+    toward = -(v * out).sum(axis=1)
+    out, v, toward = out[toward > 0.2], v[toward > 0.2], toward[toward > 0.2]
+    x = center + out * (0.8 + random.uniform(0, 0.009, len(out)) * toward)[:, None]  # they hit within a step
+    ball = pm.Sphere(center, 0.8, restitution=0.5, friction=0.0)
+    system = pm.ParticleSystem(pm.Particles(x, v, dtype=dtype), [pm.Drag(0.1)], ball)
+    sim = pm.Simulation(system, pm.SymplecticEuler(), dt=0.01, compiled=compiled)
+    sim.step()
+    normal = (system.particles.x - center) / np.linalg.norm(system.particles.x - center, axis=1)[:, None]
+    away = (system.particles.v * normal).sum(axis=1)
+    assert system.particles.v.any(axis=1).all()  # nobody is stopped for hitting too often
+    assert np.median(away / toward) == pytest.approx(0.5, rel=0.02)

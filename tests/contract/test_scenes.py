@@ -19,6 +19,7 @@ SMALL = {  # fewer particles where the default takes long; the physics is the sa
     "snow": {"rate": 60.0},
     "smoke": {"rate": 60.0},
     "bounce": {"balls": 20},
+    "dust": {"sand": 400, "dust": 60.0},
 }
 VARIANTS = [(name, SMALL.get(name, {})) for name in SCENES] + [
     ("orbit", {"kind": "kepler"}),
@@ -81,11 +82,11 @@ QUICK = {
     "flow": {"particles": 20, "arrows": 0, "streamlines": 0},
     "springs": {"side": 3},
     "bounce": {"balls": 10},
-    **{name: SMALL[name] for name in ("fireworks", "snow", "smoke")},
+    **{name: SMALL[name] for name in ("fireworks", "snow", "smoke", "dust")},
 }
 COSTLY = {  # only so many steps
     *("balls", "rate", "links", "side", "particles", "mass", "stiffness", "steps_per_second"),
-    *("launches", "stars", "tail", "smoke"),
+    *("launches", "stars", "tail", "smoke", "sand", "dust"),
 }
 ENDS = [
     (name, parameter["name"], value)

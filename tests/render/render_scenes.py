@@ -42,6 +42,7 @@ def everything(count=60, dtype=np.float64, index=np.int64, seed=3):
         floor,
         square(0.7, 1.0, (0.2, 0.4, 0.9, 0.4)),
         Points(name="balls", index=rows[::2], radius=0.15, color=colors[::2]),
+        Points(name="smeared", index=rows[1::4], radius=0.1, color=colors[1::4], motion=0.4 * places[::4]),
         Points(name="clear", index=rows[:5], radius=0.3, color=(0.9, 0.2, 0.2, 0.5)),
         Points(name="sparks", index=rows[1::2], radius=0.05, color=colors[1::2], glow=True),
         Points(name="streaks", index=rows[::3], radius=0.05, color=colors[::3], glow=True, motion=0.3 * places[::3]),

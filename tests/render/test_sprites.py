@@ -1,4 +1,4 @@
-"""Streaks, smoke and flakes."""
+"""Streaks, smeared balls, smoke and flakes."""
 
 import math
 
@@ -58,6 +58,58 @@ def test_a_streak_ends_at_solid_things():
     within = np.s_[50:70, 80 - int(0.8 * SCALE) : 80 + int(0.8 * SCALE)]
     assert np.abs(seen - wall)[within].max() < 1e-5
     assert (seen - wall)[60, 80 + int(1.2 * SCALE), 0] > 0.01
+
+
+DARK = Style(light=(0, 0, -1), ambient=0.0, bottom=(1, 1, 1), top=(1, 1, 1), bloom=0.0, pool=0.0, shadows=False)
+
+
+def ball(motion=None, radius=0.3, color=(0.0, 0.0, 0.0, 1.0), **more):
+    return Points(name="b", radius=radius, color=color, motion=motion, **more)
+
+
+def covered(*drawables, place=(0.013, -0.021, 0.0)):
+    """Which part of each pixel of a white picture black things hide, shape (height, width)."""
+    return 1.0 - shone(np.array([place]), *drawables, style=DARK)[:, :, 1]
+
+
+@pytest.mark.parametrize("alpha", [1.0, 0.4])
+@pytest.mark.parametrize("radius", [0.01, 0.06, 0.3])
+@pytest.mark.parametrize("motion", [(0.06, 0, 0), (0.1, 0.07, 0), (0, -0.7, 0), (1.1, 1.3, 0)])
+def test_a_smeared_ball_hides_as_much_as_a_sharp_one(motion, radius, alpha):
+    hidden = covered(ball(np.array([motion]), radius, (0, 0, 0, alpha)))
+    assert hidden.sum() == pytest.approx(alpha * math.pi * (radius * SCALE) ** 2, rel=0.05)
+    assert hidden.min() > -1e-6
+    assert hidden.max() < alpha + 1e-6
+
+
+@pytest.mark.parametrize("motion", [(0.9, 0.4, 0.0), (0.25, -0.1, 0.0), (0.5, 0.2, 1.5)])
+def test_a_smeared_ball_is_the_mean_of_balls_on_its_way(motion):
+    # The naive way: the mean of many pictures while the shutter is open.
+    end, motion, count = np.array([0.4, 0.2, 0.0]), np.array(motion), 200
+    lit_ball = ball(color=(0.6, 0.3, 0.2, 1.0))
+    way = end - motion * ((np.arange(count) + 0.5) / count)[:, None]
+    style = Style(bottom=(0, 0, 0), top=(0, 0, 0), bloom=0.0, pool=0.0, shadows=False)
+    mean = np.mean([shone(x[None], lit_ball, style=style) for x in way], axis=0)
+    one = shone(end[None], ball(motion[None], color=lit_ball.color), style=style)
+    assert np.abs(one - mean).max() < 0.15 * mean.max()
+    assert one.sum() == pytest.approx(mean.sum(), rel=0.05)
+
+
+def test_a_ball_that_hardly_moves_is_sharp_and_one_from_behind_the_eye_too():
+    place = (0.0, 0.0, 9.5)
+    for motion, spot in (((1e-3, 0.0, 0.0), (0.0, 0.0, 0.0)), ((0.1, 0.0, -3.0), place)):
+        still, moved = (covered(ball(m, 0.1), place=spot) for m in (None, np.array([motion])))
+        np.testing.assert_array_equal(moved, still)
+
+
+def test_a_smeared_ball_passes_behind_solid_things():
+    place, wall = (1.5, 0.0, -1.0), square(1.0, color=(0, 0, 0, 1))
+    passing = ball(np.array([[3.0, 0, 0]]), color=(1.0, 1.0, 1.0, 1.0))
+    style = Style(bottom=(0, 0, 0), top=(0, 0, 0), bloom=0.0, pool=0.0, shadows=False)
+    seen, alone = (shone(np.array([place]), wall, *more, style=style) for more in ((passing,), ()))
+    within = np.s_[45:75, 80 - int(0.95 * SCALE) : 80 + int(0.95 * SCALE)]
+    np.testing.assert_allclose(seen[within], alone[within], atol=1e-5)
+    assert (seen - alone).max() > 0.05
 
 
 def puff(alpha=0.5, radius=0.5, color=(0.5, 0.5, 0.5), **more):
@@ -170,7 +222,7 @@ def test_a_puff_ends_at_its_reach():
 
 def test_sprites_with_nothing_and_with_numbers_that_are_not_finite():
     bad = np.array([[0, 0, 0], [np.nan, 0, 0], [0, 0, 10.0], [0, 0, 40.0], [1e300, 0, 0]])
-    for more in ({"soft": True}, {"normals": np.zeros((5, 3))}, {"glow": True, "motion": bad}):
+    for more in ({"soft": True}, {"normals": np.zeros((5, 3))}, {"glow": True, "motion": bad}, {"motion": bad}):
         picture = image(frame(bad, Points(name="p", radius=0.2, **more)), camera=FRONT, size=SIZE)
         assert picture.shape == (120, 160, 3)
     for more in ({"soft": True}, {"normals": np.zeros((0, 3))}, {"glow": True, "motion": np.zeros((0, 3))}):
@@ -183,6 +235,7 @@ def test_sprites_with_nothing_and_with_numbers_that_are_not_finite():
         {"normals": np.zeros((2, 3))},
         {"soft": True, "motion": np.zeros((2, 3))},
         {"glow": True, "motion": np.zeros((4, 3))},
+        {"motion": np.zeros((2, 3))},
     ],
 )
 def test_arrays_that_do_not_fit_are_named(more):

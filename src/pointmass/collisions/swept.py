@@ -271,14 +271,17 @@ def _deepest(approach: _Approach, a: Array, b: Array) -> Array:
 
 
 def _newton(approach: _Approach, a: Array, b: Array) -> Array:
-    """Fraction from a at which the gap is first 0; inf if it never is."""
+    """Fraction from a at which the gap is first 0; inf if it never is, or if a is on the surface and b leads away.
+
+    Who has just bounced begins there, perhaps a rounding inside, and does not hit again.
+    """
     s, open_ = np.zeros(len(a)), np.ones(len(a), bool)
     for _ in range(NEWTON_STEPS):
         point = a + np.where(open_, s, 0)[:, None] * (b - a)
         gap = approach.gap_at(point)
         slope = rows_dot(approach.surface.local_normal(point), b - a)
         with np.errstate(divide="ignore", invalid="ignore"):
-            step = np.where(gap <= 0, 0.0, np.where(slope < 0, -gap / slope, np.inf))
+            step = np.where(slope < 0, np.where(gap > 0, -gap / slope, 0.0), np.inf)
         s = np.where(open_, np.where(s + step > 1, np.inf, s + step), s)
         open_ &= np.isfinite(s) & (step > 1e-15)
         if not open_.any():

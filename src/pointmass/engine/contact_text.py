@@ -410,12 +410,12 @@ def enters(P, k, ax, ay, az, bx, by, bz, radius, level):
     for _ in range(NEWTON_STEPS):
         x, y, z = ax + s * dx, ay + s * dy, az + s * dz
         gap = gap_of(P, k, x, y, z) - radius - level
-        if gap <= 0:
-            return s
         nx, ny, nz = normal_of(P, k, x, y, z)
         slope = dot3(nx, ny, nz, dx, dy, dz)
         if not slope < 0:
             return np.inf
+        if gap <= 0:
+            return s
         step = -gap / slope
         if s + step > 1:
             return np.inf

@@ -53,6 +53,8 @@ from pointmass.render.kernels_shade import (
     unit,
 )  # fmt: skip
 
+GAUSS = np.float32(0.5 / math.sqrt(3.0))  # from the middle of an interval to the places of the two-point rule
+STRIPS = 4  # lines along the way for which a pixel asks how long a smeared ball covers it
 WIDTH = 8  # pixels that the processor does at once
 HALO = np.float32(_HALO)
 MIN_BALL = np.float32(_MIN_BALL)
@@ -285,8 +287,55 @@ def _ball_solid(c, box, area, tile, count, camera, offsets):
 
 
 @inner
+def _ball_smeared(c, box, area, tile, count, camera):
+    """A ball on its way covers a place for the share of the time in which it lies over it.
+
+    A disc on a straight way lies over a point for as long as the disc's chord through the point is, along the way; the
+    sum over all points is the disc's area. Each pixel takes the mean of STRIPS such lines. It shows the mean of what
+    the ball shows at two moments of that time, those of Gauss's quadrature.
+    """
+    w = ONE / c[2]
+    radius = camera[0] * w * c[3]
+    size = max(radius, ONE)
+    sharp = c[2] * c[2] / c[3]
+    x, y = camera[1] + camera[0] * w * c[0], camera[2] - camera[0] * w * c[1]
+    square = c[9] * c[9] + c[10] * c[10]
+    length = math.sqrt(square)
+    ux, uy = c[9] / length, c[10] / length
+    reach = math.sqrt(max(square, ONE))  # of its way: one that is shorter has jagged edges
+    strength = c[7] * (radius / size) * (radius / size) / (np.float32(STRIPS) * reach)
+    left, right, first, last = _cut(box, area)
+    for row in range(first, last):
+        start = _place(row, area)
+        if count + 2 * (right - left) > WAITING:
+            count = flush(tile, count)
+        for column in range(left, right):
+            px, py = np.float32(column) + HALF, np.float32(row) + HALF
+            along, across = (px - x) * ux + (py - y) * uy, (py - y) * ux - (px - x) * uy
+            covered, moment = ZERO, ZERO
+            for k in range(STRIPS):
+                off = across + (np.float32(k) + HALF) / np.float32(STRIPS) - HALF
+                chord = math.sqrt(max(size * size - off * off, ZERO))
+                begin, end = max(along - chord, -HALF * reach), min(along + chord, HALF * reach)
+                if end > begin:
+                    covered += end - begin
+                    moment += HALF * (end - begin) * (end + begin)
+            if covered > ZERO:
+                alpha, middle = strength * covered, moment / covered
+                apart = GAUSS * covered / np.float32(STRIPS)
+                # The first is laid over what lies behind, the second over both: then each counts for a half.
+                for part in (alpha / (TWO - alpha), HALF * alpha):
+                    dx, dy = _ray(px - (middle - apart) * ux, py - (middle - apart) * uy, camera)
+                    count = _put_ball(c, dx, dy, part, w, sharp, tile, count, start + column, NONE)
+                    apart = -apart
+    return count
+
+
+@inner
 def _ball_soft(c, box, area, tile, count, camera):
     """A ball that is small or lets light through: coverage from the distance to its edge."""
+    if c[9] != ZERO or c[10] != ZERO:
+        return _ball_smeared(c, box, area, tile, count, camera)
     w = ONE / c[2]
     scale = camera[0] * w
     radius = scale * c[3]

@@ -12,10 +12,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pointmass.errors import InvalidInput
-from pointmass.frame import Floats, Frame, Points
-from pointmass.render.camera import View, turn
-from pointmass.render.tables import F64, Table, bounded, colors, column, corners, named, pixel_box
+from pointmass.frame import Frame, Points
+from pointmass.render.camera import View
+from pointmass.render.tables import F64, Table, colors, column, corners, named, pixel_box, turned
 
 COLUMNS = 26
 PUFF = 1.6  # a puff ends at this many radii
@@ -44,8 +43,8 @@ def sprites(points: Points, frame: Frame, view: View, focus: float) -> Table:
     seen = view.see(places)
     radius = column(points.radius, len(seen), points.name)
     color = colors(points.color, len(seen), points.name)
-    normals = _turned("normals", points.normals, points, seen, view)
-    motion = _turned("motions", points.motion, points, seen, view)
+    normals = turned("normals", points.normals, points.name, seen, view)
+    motion = turned("motions", points.motion, points.name, seen, view)
     with np.errstate(invalid="ignore"):
         keep = (seen[:, 2] > view.near) & (radius > 0.0) & (color[:, 3] > 0.0)
         keep &= np.isfinite(seen.sum(axis=1) + radius + color.sum(axis=1) + normals.sum(axis=1) + motion.sum(axis=1))
@@ -62,17 +61,6 @@ def sprites(points: Points, frame: Frame, view: View, focus: float) -> Table:
     box = pixel_box(rows[:, 0:2] - reach, rows[:, 0:2] + reach, view.width, view.height)
     no = np.zeros(len(rows), bool)
     return Table(rows.astype(np.float32), box, seen[:, 2], no, no)
-
-
-def _turned(what: str, vectors: Floats | None, points: Points, seen: F64, view: View) -> F64:
-    """Vectors of the items in view coordinates, shape (n, 3); 0 where none are given."""
-    if vectors is None:
-        return np.zeros_like(seen)
-    given = np.asarray(vectors, dtype=np.float64)
-    if given.shape != seen.shape:
-        raise InvalidInput(f"drawable {points.name!r} has {len(seen)} items, but {what} of shape {given.shape}")
-    turned: F64 = turn(bounded(given), view.axes)
-    return turned
 
 
 def _puffs(rows: F64, view: View) -> None:

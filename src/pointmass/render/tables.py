@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pointmass.errors import InvalidInput
 from pointmass.frame import Drawable, Floats, Frame
-from pointmass.render.camera import FARTHEST
+from pointmass.render.camera import FARTHEST, View, turn
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]
@@ -83,6 +83,16 @@ def named(rows: F64, index: Any, name: str) -> F64:
         raise InvalidInput(f"drawable {name!r} names corner {wrong}, but there are {len(rows)} (0 to {len(rows) - 1})")
     chosen: F64 = rows[index.astype(np.intp, copy=False)]
     return chosen
+
+
+def turned(what: str, vectors: Floats | None, name: str, seen: F64, view: View) -> F64:
+    """Vectors of the items at `seen` in view coordinates, shape (n, 3); 0 where none are given."""
+    if vectors is None:
+        return np.zeros_like(seen)
+    given = np.asarray(vectors, dtype=np.float64)
+    if given.shape != seen.shape:
+        raise InvalidInput(f"drawable {name!r} has {len(seen)} items, but {what} of shape {given.shape}")
+    return turn(bounded(given), view.axes)
 
 
 def column(value: Floats | float, count: int, name: str) -> F64:

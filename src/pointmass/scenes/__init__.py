@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pointmass.scenes.base import CheckFailed, ShippedScene
 from pointmass.scenes.bounce import Bounce
+from pointmass.scenes.dust import Dust
 from pointmass.scenes.fireworks import Fireworks
 from pointmass.scenes.flow import FlowScene
 from pointmass.scenes.fountain import Fountain
@@ -14,7 +15,8 @@ from pointmass.scenes.snow import Snow
 from pointmass.scenes.springs import SpringsScene
 
 SCENES: dict[str, type[ShippedScene]] = {
-    scene.name: scene for scene in (Pendulum, Bounce, FlowScene, Orbit, SpringsScene, Fountain, Fireworks, Snow, Smoke)
+    scene.name: scene
+    for scene in (Pendulum, Bounce, FlowScene, Orbit, SpringsScene, Fountain, Fireworks, Snow, Smoke, Dust)
 }
 
 __all__ = ["SCENES", "CheckFailed", "ShippedScene"]
