@@ -1,0 +1,238 @@
+"""Triangle meshes: read from files, checked, and cleaned of what is no surface."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pointmass.errors import InvalidInput, about, finite_array, floats, shown
+
+Vertices = NDArray[np.float64]
+Faces = NDArray[np.int64]
+FORMATS = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off")
+SAME = 1e-9  # of a mesh's size: vertices nearer to each other are one
+FLAT = 1e-12  # of the square of its longest edge: a triangle of less area is none
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """Triangles that share vertices.
+
+    Attributes
+    ----------
+    vertices : [m], shape (n, 3), no two of them at the same place.
+    faces : the three vertices of each triangle, shape (k, 3), counter-clockwise seen from its outer side.
+    """
+
+    vertices: Vertices
+    faces: Faces
+
+    @cached_property
+    def corners(self) -> NDArray[np.float64]:
+        """Places of the corners of each triangle [m], shape (k, 3, 3): triangle, corner, axis."""
+        return self.vertices[self.faces]
+
+    @cached_property
+    def areas(self) -> NDArray[np.float64]:
+        """Area of each triangle [m^2], shape (k,)."""
+        result: NDArray[np.float64] = 0.5 * np.linalg.norm(_across(self.corners), axis=1)
+        return result
+
+    @cached_property
+    def normals(self) -> NDArray[np.float64]:
+        """Outer unit normal of each triangle, shape (k, 3)."""
+        across = _across(self.corners)
+        result: NDArray[np.float64] = across / np.linalg.norm(across, axis=1)[:, None]
+        return result
+
+    @cached_property
+    def edges(self) -> tuple[Faces, Faces]:
+        """The edges, shape (e, 2), and for each triangle those from corner 0 to 1, 1 to 2 and 2 to 0, shape (k, 3)."""
+        ends = np.sort(_sides(self.faces).reshape(-1, 2), axis=1)
+        pairs, which = np.unique(ends, axis=0, return_inverse=True)
+        return pairs, which.reshape(-1, 3)
+
+    @cached_property
+    def closed(self) -> bool:
+        """Whether it bounds a solid: every edge belongs to two triangles, which run along it in opposite directions."""
+        return self.open_edges == 0 and bool((self._runs == 0).all())
+
+    @cached_property
+    def open_edges(self) -> int:
+        """How many edges belong to another number of triangles than two."""
+        _, which = self.edges
+        return int((np.bincount(which.ravel()) != 2).sum())
+
+    @cached_property
+    def volume(self) -> float:
+        """Volume [m^3] inside of a closed mesh, below 0 where its triangles face inwards."""
+        a, b, c = np.moveaxis(self.corners - self.vertices.mean(axis=0), 1, 0)
+        return float((a * np.cross(b, c)).sum() / 6)
+
+    @cached_property
+    def _runs(self) -> NDArray[np.int64]:
+        """For each edge the triangles that run along it upwards in the order of the vertices, less those downwards."""
+        pairs, which = self.edges
+        way = np.where(np.diff(_sides(self.faces), axis=2)[:, :, 0] > 0, 1, -1)
+        return np.bincount(which.ravel(), way.ravel(), len(pairs)).astype(np.int64)
+
+
+def read_mesh(path: str | Path) -> TriangleMesh:
+    """Read the triangles of a file, all its parts together.
+
+    Vertices at the same place become one, triangles without area are left out, and of a mesh that is closed all
+    triangles are turned to face outwards.
+
+    Parameters
+    ----------
+    path : `.obj`, `.ply`, `.stl`, `.glb`, `.gltf` or `.off`. Larger polygons are cut into triangles. Lengths are taken
+        as [m], and the file's y axis is up.
+
+    Raises
+    ------
+    InvalidInput
+        No such file, a file of another kind or cut off, no triangles in it, a vertex that is not finite.
+    """
+    file = Path(path)
+    if file.suffix.lower() not in FORMATS:
+        raise InvalidInput(f"mesh file {str(path)!r} must end in {', '.join(FORMATS)}, not in {file.suffix!r}")
+    if not file.is_file():
+        raise InvalidInput(f"mesh file {str(path)!r} does not exist")
+    with about(f"mesh file {str(path)!r}"):
+        return triangle_mesh(*_contents(file))
+
+
+def triangle_mesh(vertices: Any, faces: Any) -> TriangleMesh:
+    """Check triangles given as arrays, and clean them in the same way as `read_mesh`.
+
+    Parameters
+    ----------
+    vertices : [m], shape (n, 3).
+    faces : three of the vertices' numbers for each triangle, shape (k, 3).
+
+    Raises
+    ------
+    InvalidInput
+        Another shape, a vertex that is not finite, a face with a vertex that does not exist, no triangle with an area.
+    """
+    points = finite_array("vertices of a mesh", vertices, (None, 3))
+    corners = _numbers(faces, len(points))
+    points, corners = _merged(points, corners)
+    corners = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
+    corners = corners[~_flat(points[corners])]
+    if len(corners) == 0:
+        raise InvalidInput("a mesh needs at least one triangle whose area is not 0")
+    used, corners = np.unique(corners, return_inverse=True)
+    return _facing_outwards(TriangleMesh(points[used], corners.reshape(-1, 3).astype(np.int64)))
+
+
+def as_mesh(mesh: Any) -> TriangleMesh:
+    """A mesh as it is, read from its path, or made of a pair (vertices, faces)."""
+    if isinstance(mesh, TriangleMesh):
+        return mesh
+    if isinstance(mesh, (str, Path)):
+        return read_mesh(mesh)
+    if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
+        return triangle_mesh(*mesh)
+    raise InvalidInput(f"a mesh must be the path of a file or a pair (vertices, faces), not {shown(mesh)}")
+
+
+def _contents(file: Path) -> tuple[Any, Any]:
+    """Vertices and faces of a file as they stand there."""
+    import trimesh
+
+    try:
+        if file.suffix.lower() == ".gltf":
+            json.loads(file.read_bytes())  # of one that is none, trimesh would read a `model.gltf` beside it
+        found = trimesh.load(file, force="mesh", process=False)
+    except Exception as error:  # its readers raise whatever their parsing of bytes and text runs into
+        raise InvalidInput(
+            f"it is damaged or not what its ending says ({type(error).__name__}): write it again"
+        ) from None
+    if not isinstance(found, trimesh.Trimesh) or len(found.faces) == 0:
+        raise InvalidInput("it holds no triangles")
+    return np.asarray(found.vertices), np.asarray(found.faces)
+
+
+def _numbers(faces: Any, count: int) -> Faces:
+    """Numbers of vertices, each of them below `count`."""
+    array = floats(faces)
+    if array is None or array.ndim != 2 or array.shape[1] != 3 or (array != np.floor(array)).any():
+        raise InvalidInput(f"faces of a mesh must be whole numbers of shape (k, 3), not {shown(faces)}")
+    wrong = np.flatnonzero(~((array >= 0) & (array < count)).all(axis=1))
+    if len(wrong):
+        k = int(wrong[0])
+        raise InvalidInput(
+            f"face {k} of a mesh has the vertices {array[k].astype(int).tolist()}: they are numbered 0 to {count - 1}"
+        )
+    return array.astype(np.int64)
+
+
+def _merged(points: Vertices, faces: Faces) -> tuple[Vertices, Faces]:
+    """The same with one vertex for those at the same place; a file of STL has its own three for each triangle."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    if len(points) == 0:
+        return points, faces
+    exact, which = np.unique(points + 0.0, axis=0, return_inverse=True)  # + 0.0 makes of -0 a 0
+    faces = which.ravel()[faces]
+    near = cKDTree(exact).query_pairs(SAME * float(np.ptp(exact, axis=0).max()), output_type="ndarray")
+    if len(near) == 0:
+        return exact, faces
+    links = coo_matrix((np.ones(len(near), bool), near.T), (len(exact), len(exact)))
+    _, group = connected_components(links, directed=False)
+    _, first = np.unique(group, return_index=True)
+    return exact[first], group[faces].astype(np.int64)
+
+
+def _across(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Normals of triangles, twice as long as their areas."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def _flat(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which triangles have no area."""
+    longest = ((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=2).max(axis=1, initial=0)
+    flat: NDArray[np.bool_] = np.linalg.norm(_across(corners), axis=1) <= 2 * FLAT * longest
+    return flat
+
+
+def _sides(faces: Faces) -> Faces:
+    """Both ends of the sides of each triangle, in its direction, shape (k, 3, 2)."""
+    return np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)
+
+
+def _facing_outwards(mesh: TriangleMesh) -> TriangleMesh:
+    """A closed mesh with all triangles turned so that their normals point out of the solid; an open one as it is.
+
+    Both sides of every triangle are nodes of a graph; sides that look the same way over a common edge are linked, and
+    each surface then has two components.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    if mesh.open_edges:
+        return mesh
+    if not mesh.closed:
+        k = len(mesh.faces)
+        _, which = mesh.edges
+        two = np.argsort(which, axis=None, kind="stable").reshape(-1, 2) // 3
+        against = np.abs(mesh._runs) == 2
+        a, b = two[:, 0], two[:, 1]
+        links = np.concatenate([[a, b + k * against], [a + k, b + k * ~against]], axis=1)
+        _, label = connected_components(coo_matrix((np.ones(links.shape[1], bool), links), (2 * k, 2 * k)), False)
+        if (label[:k] == label[k:]).any():
+            return mesh  # one-sided, such as a Klein bottle
+        count = np.bincount(label[:k], minlength=label.max() + 1)
+        turn = count[label[:k]] < count[label[k:]]
+        turn |= (count[label[:k]] == count[label[k:]]) & (label[:k] > label[k:])
+        mesh = TriangleMesh(mesh.vertices, np.where(turn[:, None], mesh.faces[:, ::-1], mesh.faces))
+    return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1]) if mesh.volume < 0 else mesh
