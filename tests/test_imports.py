@@ -12,9 +12,26 @@ import pytest
 
 import pointmass as pm
 
-HEAVY = ("numba", "scipy", "pydantic", "zarr", "numcodecs", "av", "PIL", "rich", "click", "starlette", "matplotlib")
+HEAVY = (
+    "numba",
+    "scipy",
+    "pydantic",
+    "zarr",
+    "numcodecs",
+    "av",
+    "PIL",
+    "rich",
+    "click",
+    "starlette",
+    "matplotlib",
+    "trimesh",
+)
 SOURCES = Path(pm.__file__).parent
-TEXTS = ("engine/support.py", "engine/contact_text.py")  # what kernels import, and a kernel's text
+TEXTS = (
+    "engine/support.py",
+    "engine/contact_text.py",
+    "engine/triangles_text.py",
+)  # what kernels import, and kernels' texts
 
 
 def loaded_by(code: str) -> set[str]:

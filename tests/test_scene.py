@@ -37,6 +37,8 @@ NEEDED: dict[str, dict[str, Any]] = {  # what cannot be left out, by kind
     "points": {"x": [[0.0, 1.0, 0.0], [0.5, 1.2, 0.1]]},
     "scatter": {"count": 4},
     "polygon": {"vertices": SQUARE},
+    "mesh": {"mesh": [SQUARE, [[0, 1, 2], [0, 2, 3]]]},
+    "height_field": {"heights": [[0.0, 0.1, 0.2], [0.1, 0.0, -0.1]]},
 }
 OTHER: dict[str, Any] = {  # another value than the default, by annotation
     "Contact": "discrete",

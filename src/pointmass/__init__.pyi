@@ -40,6 +40,12 @@ from .collisions import (
     Cylinder as Cylinder,
 )
 from .collisions import (
+    HeightField as HeightField,
+)
+from .collisions import (
+    Mesh as Mesh,
+)
+from .collisions import (
     Plane as Plane,
 )
 from .collisions import (

@@ -25,6 +25,7 @@ from pointmass.frame import Camera
 from pointmass.laws.force import Force
 from pointmass.laws.grid import Grid
 from pointmass.look import Look
+from pointmass.meshes import TriangleMesh
 from pointmass.particles import Particles
 from pointmass.registries import LISTS
 from pointmass.simulation import DEFAULT_DT, Simulation
@@ -35,6 +36,7 @@ from pointmass.toml import dumps
 from pointmass.zones import WHEN_FULL, WhenFull, Zone
 
 VERSION = 1
+PATHS = (".grid", ".mesh", ".heights")  # parameters that may be paths
 HOLDS: dict[str, type] = {"bodies": Body, "forces": Force, "colliders": Collider, "emitters": Emitter, "zones": Zone}
 PLAIN = ("name", "summary", "dt", "frames", "fps", "seed", "dtype", "max_particles", "when_full")
 
@@ -352,7 +354,9 @@ def _plain(value: Any, where: str, folder: Path | None) -> Any:
         return {str(k): _plain(v, where, folder) for k, v in value.items() if v is not None}
     if isinstance(value, (list, tuple, range)):
         return [_plain(v, where, folder) for v in value]
-    if isinstance(value, Path) or (isinstance(value, str) and where.endswith(".grid")):
+    if isinstance(value, TriangleMesh):
+        return [value.vertices.tolist(), value.faces.tolist()]
+    if isinstance(value, Path) or (isinstance(value, str) and where.endswith(PATHS)):
         return _way(value, folder)
     if isinstance(value, (str, bool, int, float)):
         return value
@@ -394,6 +398,9 @@ def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, fol
             values["around"] = [_made(COLLIDERS, solid, f"{where}.around.{k}", folder) for k, solid in solids]
         if "grid" in values:
             values["grid"] = _grid(values["grid"], folder)
+        for name in ("mesh", "heights"):
+            if isinstance(values.get(name), str):
+                values[name] = _found(name, values[name], folder)
         return registry[kind](**values)
     except InvalidInput as error:
         raise InvalidInput(f"{where} ({kind}): {error}") from None
@@ -403,12 +410,15 @@ def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, fol
 
 def _grid(value: Any, folder: Path | None) -> Any:
     settings = dict(value) if isinstance(value, Mapping) else {"path": value}
-    path = str(settings.pop("path"))
-    if "\0" in path:
-        raise InvalidInput(f"grid = {path!r} is not allowed: no file has a name with a zero character")
-    # Found again from wherever this scene, or a cache that keeps its text, is read.
-    path = path if folder is None else str((folder / path).resolve())
+    path = _found("grid", str(settings.pop("path")), folder)
     return load_grid(path, **settings) if settings else path
+
+
+def _found(name: str, path: str, folder: Path | None) -> str:
+    """A path such that it is found again from wherever this scene, or a cache that keeps its text, is read."""
+    if "\0" in path:
+        raise InvalidInput(f"{name} = {path!r} is not allowed: no file has a name with a zero character")
+    return path if folder is None else str((folder / path).resolve())
 
 
 def _made_solver(value: Any) -> Solver | None:

@@ -87,12 +87,17 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
     "Axis": (Row | str, "three numbers, such as [0, 1, 0], or 'normal'"),
     "Chance": (CHANCE, f"a number, or {SPREAD}"),
     "Grid | str": (str | GridTable, "the path of a file, or a table with its path"),
+    "HeightSource": (str | list[list[float]], "the path of a file, or a list of rows of heights"),
     "Rate": (float | str, "a number, or a formula of t in quotes"),
     "Scalar": SCALAR,
     "Selection": (str | list[int] | list[bool], "the name of a body or group, or a list of rows"),
     "Sequence[tuple[float, int]]": (
         list[_exactly(2, float)],  # type: ignore[misc]
         "a list of times and counts, such as [[0, 100], [0.5, 200]]",
+    ),
+    "TriangleSource": (
+        str | _exactly(2, list[list[float]]),
+        "the path of a file, or a list of vertices and a list of faces",
     ),
     "Vector": VECTOR,
     "Color": (str | float, "a colour, such as orange or #ffb454, or a temperature [K]"),

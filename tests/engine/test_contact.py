@@ -37,6 +37,14 @@ WORLDS["round"] = lambda **k: [
     pm.Cylinder((0, -1.2, 0), (0.1, 1.4, 0), radius=1.3, inside=True, **k),
     pm.Cylinder((0.8, 0.8, 0), (1, 1, 0.3), radius=0.2, **k),
 ]
+BLOCK = (
+    [[0.9, 0.9, 0.9], [0.9, -0.9, -0.9], [-0.9, 0.9, -0.9], [-0.9, -0.9, 0.9]],
+    [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
+)
+SHEET = ([[-1, 0, -1], [-1, 0.2, 1], [1, 0.5, 1], [1, -0.1, -1], [0, 0.8, 0]], [[0, 1, 4], [1, 2, 4], [2, 3, 4]])
+HILLS = 0.3 * np.sin(np.arange(7))[:, None] * np.cos(np.arange(6))
+WORLDS["meshes"] = lambda **k: [pm.Mesh(BLOCK, **k), pm.Mesh(SHEET, shift=(0, "1.2+0.2*sin(8*t)", 0), **k)]
+WORLDS["hills"] = lambda **k: [pm.HeightField(HILLS, (2.5, 2.5), **k), pm.Plane((0, -1.2, 0), **k)]
 WORLDS["everything"] = lambda **k: [c for name in ("room", "ball", "paddle", "plates") for c in WORLDS[name](**k)]
 FLOATS = st.floats(-1.4, 1.4)
 POINTS = st.tuples(FLOATS, FLOATS, FLOATS)
@@ -89,7 +97,11 @@ class ScalarEngine(ReferenceEngine):
         for i in range(len(p)):
             o = i * self.text.record
             self.scratch[o] = 0
-            if h[self._islands[i]] > 0 and not p.pinned[i] and do["near"](self.table, t[i], *x[i], p.radius[i]):
+            if (
+                h[self._islands[i]] > 0
+                and not p.pinned[i]
+                and do["near"](self.table, self.scratch, o, t[i], *x[i], p.radius[i])
+            ):
                 v[i] = do["find"](self.table, self.scratch, o, t[i], *x[i], *v[i], p.m[i], *a[i], p.radius[i])
         system.filter = Filter(self) if self.scratch[:: self.text.record].any() else None
         return y
@@ -111,7 +123,7 @@ class ScalarEngine(ReferenceEngine):
             x[i], v[i] = np.reshape(
                 do["settle"](self.table, self.scratch, o, end[i], length[i], *x[i], *v[i], radius), (2, 3)
             )
-            *state, hit = do["bounce"](self.table, end[i], *x[i], *v[i], radius)
+            *state, hit = do["bounce"](self.table, self.scratch, o, end[i], *x[i], *v[i], radius)
             reset[islands[i]] |= hit > 0
             doomed[i] = hit >= KILLED
             x[i], v[i] = np.reshape(state, (2, 3))
@@ -138,7 +150,18 @@ class ScalarEngine(ReferenceEngine):
         began, when = self._began
         for i in moved:
             x[i], v[i] = np.reshape(
-                do["evict"](self.table, now[i], *x[i], *v[i], p.radius[i], *began[i], when[i]), (2, 3)
+                do["evict"](
+                    self.table,
+                    self.scratch,
+                    i * self.text.record,
+                    now[i],
+                    *x[i],
+                    *v[i],
+                    p.radius[i],
+                    *began[i],
+                    when[i],
+                ),
+                (2, 3),
             )
         self._keep(step, h, 0.0)
         system.filter = None
@@ -263,7 +286,9 @@ def test_clear_is_never_said_where_something_happens(world, radius):
     assert said[free].all(), "it is of use"
 
 
-@pytest.mark.parametrize(("world", "solver"), [("paddle", pm.Leapfrog()), ("block", pm.ImplicitEuler())])
+@pytest.mark.parametrize(
+    ("world", "solver"), [("paddle", pm.Leapfrog()), ("block", pm.ImplicitEuler()), ("meshes", pm.RK4())]
+)
 def test_compiled_functions_give_the_same_bits(world, solver):
     x, v = np.random.default_rng(1).uniform(-1.2, 1.2, (2, 40, 3)) * [[[1]], [[20]]]
     for k in range(len(x)):

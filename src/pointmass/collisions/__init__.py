@@ -4,6 +4,8 @@ from pointmass.collisions.box import Box
 from pointmass.collisions.capsule import Capsule
 from pointmass.collisions.collider import Collider
 from pointmass.collisions.cylinder import Cylinder
+from pointmass.collisions.height_field import HeightField
+from pointmass.collisions.mesh import Mesh
 from pointmass.collisions.plane import Plane
 from pointmass.collisions.polygon import Polygon
 from pointmass.collisions.response import respond, respond_pair
@@ -16,6 +18,8 @@ COLLIDERS: dict[str, type[Collider]] = {
     "polygon": Polygon,
     "capsule": Capsule,
     "cylinder": Cylinder,
+    "height_field": HeightField,
+    "mesh": Mesh,
 }
 
 __all__ = [
@@ -24,6 +28,8 @@ __all__ = [
     "Capsule",
     "Collider",
     "Cylinder",
+    "HeightField",
+    "Mesh",
     "Plane",
     "Polygon",
     "Sphere",

@@ -45,11 +45,13 @@ class Collider(Described, ABC):
     bulges : True where the solid is convex (ball, block): a line between two free points may pass through it. False
         where the free space is convex (plane, inside of a sphere).
     curved : False where the surface is flat everywhere, and only there.
+    lookup : in what kind of data the distance is looked up: see `LookedUp`. "" where laws give it.
     smooth : True where pictures shade its mesh round.
     """
 
     bulges: ClassVar[bool] = True
     curved: ClassVar[bool] = True
+    lookup: ClassVar[str] = ""
     smooth: ClassVar[bool] = False
     place: ClassVar[str] = "center"
 

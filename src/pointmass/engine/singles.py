@@ -316,6 +316,9 @@ class SinglesKernel:
             for q in "xv"[: self.system.order]
             for k in range(3)
         ]
+        if self.remembers:  # each lane has its own contacts: from one step to the next it is near the same triangles
+            record = island.deriv.contact.record  # type: ignore[union-attr]
+            call = call.replace(", K, ", f", K[{record} * i:{record} * (i + 1)], ")
         begin = ["clock = max(clock, birth[lo + i])"] if self.births else []
         mortal = island.deadly
         alive = " and died[lo + i] == 0" if mortal else ""
@@ -400,6 +403,12 @@ class SinglesKernel:
         return self.island is not None and self.island.deadly
 
     @property
+    def remembers(self) -> bool:
+        """Whether a lane keeps what it looked up in the data of a surface."""
+        contact = None if self.island is None else self.island.deriv.contact
+        return contact is not None and contact.looks_up
+
+    @property
     def shared(self) -> list[str]:
         """Arrays that the lanes read: the scratch holds the columns."""
         more = ["F"] if self.system.colliders else []
@@ -463,7 +472,7 @@ class SingleMembers:
         kernel, scratch = self.kernel.functions["run"], self.kernel.functions["scratch"]
         died = np.zeros(count, np.uint8)
         arrays = (x, v, *kept, *data, *grid, status, reach, *[died] * self.kernel.deadly)
-        spread(lambda lo, hi: kernel(lo, hi, *arrays, *scratch([1])), tiles, GRAIN)
+        spread(lambda lo, hi: kernel(lo, hi, *arrays, *scratch([W if self.kernel.remembers else 1])), tiles, GRAIN)
         work = Stats(span.count, 0, span.count * motion.evaluations)
         far = reach.max(axis=0).astype(np.float64)
         return Outcome(not status.any(), far, work, died=self.rows[died > 0])
