@@ -37,6 +37,10 @@ class Solid(Protocol):
     def surfaces(self) -> Sequence[Any]:
         """Parts with a smooth distance."""
 
+    @property
+    def lookup(self) -> str:
+        """In what data the distance is looked up; "" where there are laws."""
+
 
 class CurlNoise(VelocityField):
     """x' = curl psi, psi a noise of three components: whirls that carry particles without crowding them.
@@ -155,4 +159,9 @@ def _listed(around: Any) -> list[Any]:
     for solid in solids:
         if not hasattr(solid, "distance_law"):
             raise InvalidInput(f"around must be a list of colliders, such as [Sphere()], not {shown(around)}")
+        if solid.lookup:
+            raise InvalidInput(
+                f"around holds a {solid.name}, but air flows around surfaces that have a formula: use spheres, boxes, "
+                "capsules or cylinders about as large"
+            )
     return solids
