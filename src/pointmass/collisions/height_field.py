@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -115,7 +115,7 @@ def _image(path: Path) -> NDArray[np.float64]:
         deep = image.mode.startswith("I") or image.mode == "F"
         levels = np.asarray(image if deep else image.convert("L"), np.float64)
         white = {"F": 1.0}.get(image.mode, 65535.0 if deep else 255.0)
-    return cast("NDArray[np.float64]", levels.T / white)
+    return levels.T / white
 
 
 def _block(heights: NDArray[np.float64], sides: NDArray[np.float64], bottom: float) -> TriangleMesh:
