@@ -22,20 +22,26 @@ def cube_along(u, count):
 
 @njit(**FLAGS)
 def triangles_cube(P, k, x, y, z):
-    """The cube of the coarse grid around a point, or that which is nearest to it, and how far the point is outside."""
+    """The cube of the coarse grid around a point, or that which is nearest to it."""
     row = k * ROW
     size = P[row + CUBE]
     u, v, w = (x - P[row + CUBES]) * size, (y - P[row + CUBES + 1]) * size, (z - P[row + CUBES + 2]) * size
     nx, ny, nz = P[row + ALONG], P[row + ALONG + 1], P[row + ALONG + 2]
-    beyond = max(max(max(-u, u - nx), max(-v, v - ny)), max(max(-w, w - nz), 0.0))
-    return (cube_along(u, nx) * int(ny) + cube_along(v, ny)) * int(nz) + cube_along(w, nz), beyond / size
+    return (cube_along(u, nx) * int(ny) + cube_along(v, ny)) * int(nz) + cube_along(w, nz)
 
 
 @njit(**FLAGS)
 def triangles_bound(P, k, x, y, z):
     """A lower bound of the distance, at once; below 0 where there is none."""
-    cube, beyond = triangles_cube(P, k, x, y, z)
-    return P[int(P[k * ROW + DATA]) + int(P[k * ROW + BOUNDS]) + cube] if beyond == 0.0 else P[k * ROW + RIM] + beyond
+    row = k * ROW
+    size = P[row + CUBE]
+    u, v, w = (x - P[row + CUBES]) * size, (y - P[row + CUBES + 1]) * size, (z - P[row + CUBES + 2]) * size
+    u = max(max(-u, u - P[row + ALONG]), 0.0) / size  # beyond the grid
+    v = max(max(-v, v - P[row + ALONG + 1]), 0.0) / size
+    w = max(max(-w, w - P[row + ALONG + 2]), 0.0) / size
+    least = P[int(P[row + DATA]) + int(P[row + BOUNDS]) + triangles_cube(P, k, x, y, z)]
+    most = max(max(u, v), w)
+    return least if most == 0.0 else max(least - length3(u, v, w), P[row + RIM] + most)
 
 
 @njit(**FLAGS)
@@ -45,7 +51,7 @@ def triangles_look(P, k, x, y, z, guess):
     boxes = int(P[row + DATA])
     triangles, normals = boxes + int(P[row + TRIANGLES]), boxes + int(P[row + NORMALS])
     count, leaves = int(P[row + COUNT]), int(P[row + LEAVES])
-    cube, _ = triangles_cube(P, k, x, y, z)
+    cube = triangles_cube(P, k, x, y, z)
     which = int(P[boxes + int(P[row + HINTS]) + cube])
     at = triangles + TRIANGLE * which
     square, qx, qy, qz, feature = triangle_of(P, at, x - P[at], y - P[at + 1], z - P[at + 2])
