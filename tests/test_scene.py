@@ -38,6 +38,7 @@ NEEDED: dict[str, dict[str, Any]] = {  # what cannot be left out, by kind
     "scatter": {"count": 4},
     "polygon": {"vertices": SQUARE},
     "mesh": {"mesh": [SQUARE, [[0, 1, 2], [0, 2, 3]]]},
+    "distance_grid": {"distances": [[[-1.0, 1.0], [1.0, 1.0]], [[1.0, 1.0], [1.0, 1.0]]], "spacing": 1.0},
     "height_field": {"heights": [[0.0, 0.1, 0.2], [0.1, 0.0, -0.1]]},
 }
 OTHER: dict[str, Any] = {  # another value than the default, by annotation

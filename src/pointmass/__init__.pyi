@@ -40,6 +40,9 @@ from .collisions import (
     Cylinder as Cylinder,
 )
 from .collisions import (
+    DistanceGrid as DistanceGrid,
+)
+from .collisions import (
     HeightField as HeightField,
 )
 from .collisions import (

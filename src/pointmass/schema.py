@@ -87,6 +87,7 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
     "Axis": (Row | str, "three numbers, such as [0, 1, 0], or 'normal'"),
     "Chance": (CHANCE, f"a number, or {SPREAD}"),
     "Grid | str": (str | GridTable, "the path of a file, or a table with its path"),
+    "DistanceSource": (str | list[list[list[float]]], "the path of a file, or rows of rows of distances"),
     "HeightSource": (str | list[list[float]], "the path of a file, or a list of rows of heights"),
     "Rate": (float | str, "a number, or a formula of t in quotes"),
     "Scalar": SCALAR,

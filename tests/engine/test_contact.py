@@ -45,6 +45,12 @@ SHEET = ([[-1, 0, -1], [-1, 0.2, 1], [1, 0.5, 1], [1, -0.1, -1], [0, 0.8, 0]], [
 HILLS = 0.3 * np.sin(np.arange(7))[:, None] * np.cos(np.arange(6))
 WORLDS["meshes"] = lambda **k: [pm.Mesh(BLOCK, **k), pm.Mesh(SHEET, shift=(0, "1.2+0.2*sin(8*t)", 0), **k)]
 WORLDS["hills"] = lambda **k: [pm.HeightField(HILLS, (2.5, 2.5), **k), pm.Plane((0, -1.2, 0), **k)]
+PEBBLE = np.linalg.norm(np.indices((9, 9, 9)) - 4.0, axis=0) / 4 - 0.6
+WORLDS["pebbles"] = lambda **k: [
+    pm.DistanceGrid(PEBBLE, spacing=0.25, shift=("0.1*sin(8*t)", 0, 0), **k),
+    pm.DistanceGrid(PEBBLE, spacing=0.8, inside=True, **k),
+    pm.HeightField(HILLS, (2.5, 2.5), shift=(0, -1.4, 0), **k),
+]
 WORLDS["everything"] = lambda **k: [c for name in ("room", "ball", "paddle", "plates") for c in WORLDS[name](**k)]
 FLOATS = st.floats(-1.4, 1.4)
 POINTS = st.tuples(FLOATS, FLOATS, FLOATS)

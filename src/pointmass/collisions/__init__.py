@@ -4,6 +4,7 @@ from pointmass.collisions.box import Box
 from pointmass.collisions.capsule import Capsule
 from pointmass.collisions.collider import Collider
 from pointmass.collisions.cylinder import Cylinder
+from pointmass.collisions.distance_grid import DistanceGrid
 from pointmass.collisions.height_field import HeightField
 from pointmass.collisions.mesh import Mesh
 from pointmass.collisions.plane import Plane
@@ -20,6 +21,7 @@ COLLIDERS: dict[str, type[Collider]] = {
     "cylinder": Cylinder,
     "height_field": HeightField,
     "mesh": Mesh,
+    "distance_grid": DistanceGrid,
 }
 
 __all__ = [
@@ -28,6 +30,7 @@ __all__ = [
     "Capsule",
     "Collider",
     "Cylinder",
+    "DistanceGrid",
     "HeightField",
     "Mesh",
     "Plane",

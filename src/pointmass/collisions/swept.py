@@ -125,7 +125,8 @@ class _Approach:
 
     def pace(self) -> Array:
         """Bound of how fast the gap changes with theta [m], shape (k,)."""
-        return self.paths.pace() + self._surface_way() if self.surface.moves else self.paths.pace()
+        pace = self.paths.pace()
+        return self.surface.steepness * (pace + self._surface_way() if self.surface.moves else pace)
 
     def _surface_way(self) -> Array:
         """Bound of the way of the surface [m], shape (k,)."""
@@ -146,6 +147,8 @@ class _Approach:
         way = paths.reach
         if surface.moves:
             way = way + self._surface_way()
+        if surface.lookup:
+            way = surface.steepness * way
         free = self.gap_at(paths.x0 - surface.at(start))
         deep: NDArray[np.bool_] = self.gap_at(paths.x1 - surface.at(end)) < 0
         return (free < way) | deep

@@ -50,7 +50,7 @@ from pointmass.tracing.trace import Traced, vector_names
 
 TABLE = (  # columns of a surface's row
     *("KIND", "SWEPT", "MOTION", "BULGES", "FLAT", "RESPONSE", "RESTITUTION", "FRICTION"),
-    *("NEAR", "ROOM", "LOOKUP", "DATA"),
+    *("NEAR", "ROOM", "LOOKUP", "STEEP", "DATA"),
     *("PLACE", "", "", "SHAPE"),
 )
 RECORD = {  # of a contact, with the size of each
@@ -107,7 +107,15 @@ class ContactText:
             room = s.eps + ROUNDING[self._dtype] * float(np.abs(place).sum())
             kind = self._kinds.index(s.lookup or s.laws)
             numbers: list[float] = [kind, s.contact == "swept", motion, s.bulges, _flat(s)]
-            numbers += [RESPONSES.index(s.response), *s.impact, s.eps, room, bool(s.lookup), self._starts[k]]
+            numbers += [
+                RESPONSES.index(s.response),
+                *s.impact,
+                s.eps,
+                room,
+                bool(s.lookup),
+                s.steepness,
+                self._starts[k],
+            ]
             numbers += [*place, *s.shape]
             row[: len(numbers)] = numbers
         return self._table

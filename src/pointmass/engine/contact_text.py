@@ -486,12 +486,15 @@ def curved_hit(P, C, o, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h
         swing = swing_of(P, k, t0, h)
         beyond = length3(qx - px, qy - py, qz - pz) + swing
         way = way + beyond
+    if LOOKUPS and P[k * ROW + LOOKUP] != 0:
+        way = P[k * ROW + STEEP] * way
     if not (start - level < way or end < level):
         return np.inf
     if LOOKUPS and P[k * ROW + LOOKUP] != 0:
         pace = pace_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h)
         if moves:
             pace = pace + beyond
+        pace = P[k * ROW + STEEP] * pace
         low, high, g_low, g_high = march(
             P, C, o, k, start - level, pace,
             x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius, level,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from pointmass.collisions import triangles, triangulated
+from pointmass.collisions import distance_grid, triangles, triangulated
 from pointmass.engine.printing import function, statements
 from pointmass.tracing.columns import expanded
 from pointmass.tracing.trace import Traced, vector_names
@@ -38,7 +38,26 @@ def _triangles(shape: int) -> str:
     return constants + found + result + body_of("triangles_text.py")
 
 
-TEXTS: Mapping[str, Callable[[int], str]] = {"triangles": _triangles}
+def _distances(shape: int) -> str:
+    """The text for grids of distances."""
+    numbers = {name: shape + j for j, name in enumerate(distance_grid.NUMBERS) if name}
+    constants = "".join(f"{name} = {value}\n" for name, value in numbers.items()) + "\n\n"
+    point = dict(zip(vector_names("p"), "xyz", strict=True))
+    own = {n: f"P[row + {name} + {j}]" for v, name in VECTORS.items() for j, n in enumerate(vector_names(v))}
+    found = _law("cell_of", "P, row, x, y, z", distance_grid.cell(), point | own)
+    part = dict(zip(vector_names("part"), "uvw", strict=True)) | {"side": "P[row + FREE]"}
+    part |= {f"d{i}{j}{k}": f"P[at + {i} * across + {j} * along + {k}]" for i, j, k in distance_grid.CORNERS}
+    arguments = "P, row, at, across, along, x, y, z, u, v, w"
+    return (
+        constants
+        + found
+        + _law("distance_of", arguments, distance_grid.distance(), point | own | part)
+        + body_of("distances_text.py")
+    )
+
+
+VECTORS = {"inverse": "INVERSE", "counts": "COUNTS", "extent": "REACH"}  # of a grid of distances
+TEXTS: Mapping[str, Callable[[int], str]] = {"triangles": _triangles, "distances": _distances}
 
 
 def _entries(array: str) -> dict[str, str]:
