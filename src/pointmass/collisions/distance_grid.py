@@ -147,10 +147,12 @@ class DistanceGrid(LookedUp):
                 raise InvalidInput("spacing and origin of a grid of distances from a file stand in the file")
             distances, spacing, origin = _read(Path(distances))
         self.values = finite_array("distances", distances, (None, None, None))
-        if min(self.values.shape) < 2 or not self.values.min() < 0 < self.values.max():
+        if min(self.values.shape) < 2:
+            raise InvalidInput(f"distances must be at least 2 x 2 x 2 numbers, not {self.values.shape}")
+        low, high = float(self.values.min()), float(self.values.max())
+        if not low < 0 < high:
             raise InvalidInput(
-                f"distances must be at least 2 x 2 x 2 numbers, below 0 in the solid and above 0 around it, not "
-                f"{self.values.shape} from {self.values.min(initial=0):g} to {self.values.max(initial=0):g} [m]"
+                f"distances must be below 0 in the solid and above 0 around it, not all from {low:g} to {high:g} [m]"
             )
         if spacing is None:
             raise InvalidInput("a grid of distances needs its spacing [m], one number or one for each axis")
