@@ -225,6 +225,27 @@ def snow():
     save("snow", *of_page("snow"))
 
 
+def dunes():
+    """Grains on a height field, and on a ring that is a mesh."""
+    n = np.linspace(-2, 2, 61)
+    x, z = np.meshgrid(n, n, indexing="ij")
+    around, tube = (a.ravel() for a in np.meshgrid(np.arange(48), np.arange(20), indexing="ij"))
+    u, v = 2 * np.pi * around / 48, 2 * np.pi * tube / 20
+    ring = np.stack([(0.6 + 0.2 * np.cos(v)) * np.cos(u), (0.6 + 0.2 * np.cos(v)) * np.sin(u), 0.2 * np.sin(v)], axis=1)
+    a, b, c, d = (20 * ((around + i) % 48) + (tube + j) % 20 for i, j in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    solids = [
+        pm.HeightField(0.15 * np.sin(3 * x + z), (4, 4), depth=0.3, friction=0.7, restitution=0.2),
+        pm.Mesh((ring, faces), shift=(0, 0.8, 0), friction=0.3, restitution=0.4),
+    ]
+    rng = np.random.default_rng(1)
+    grains = pm.Particles(rng.uniform((-0.9, 1.9, -0.7), (0.9, 4.5, 0.7), (3000, 3)), radius=0.022)
+    look = pm.Look(color="#ffb454", collider_color="#7f8aa0")
+    sim = pm.Simulation(pm.ParticleSystem(grains, [pm.Gravity()], solids), pm.Leapfrog(), 1 / 120, look=look)
+    frame = last(sim.frames(70, 60))
+    save("dunes", frame, pm.Camera(position=(2.6, 2.2, 4.2), target=(0, 0.5, 0), fov=35.0))
+
+
 def pendulum():
     """The shipped scene pendulum."""
     shipped("pendulum", 66)
@@ -302,6 +323,7 @@ PICTURES = (
     planet,
     snow,
     curl_noise,
+    dunes,
     pendulum,
     bounce,
     flow_scene,

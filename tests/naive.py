@@ -475,3 +475,38 @@ def flutter(t, chance, strength, lifetime, seed):
     last = [kick * draw(chance, cell, seed, axis) for axis in range(3)]
     u = [part * a + (1 - part) / (1 - math.exp(-h)) * b for a, b in zip(u, last, strict=True)]
     return [s * a / math.sqrt(mean) for s, a in zip(strength, u, strict=True)]
+
+
+# ------------------------------------------------------------------------------------------------ triangles
+
+
+def nearest_on_segment(p, a, b):
+    edge = sub(b, a)
+    part = min(max(dot(sub(p, a), edge) / dot(edge, edge), 0.0), 1.0)
+    return [a[k] + part * edge[k] for k in range(3)]
+
+
+def distance_to_triangle(p, a, b, c):
+    """To the plane where the foot of the perpendicular is inside, else to the nearest edge."""
+    n = cross(sub(b, a), sub(c, a))
+    above = dot(sub(p, a), n) / dot(n, n)
+    foot = [p[k] - above * n[k] for k in range(3)]
+    sides = [dot(cross(sub(v, u), sub(foot, u)), n) for u, v in ((a, b), (b, c), (c, a))]
+    if all(s >= 0 for s in sides):
+        return norm(sub(p, foot))
+    return min(norm(sub(p, nearest_on_segment(p, u, v))) for u, v in ((a, b), (b, c), (c, a)))
+
+
+def distance_to_triangles(p, vertices, faces):
+    return min(distance_to_triangle(p, *(vertices[i] for i in face)) for face in faces)
+
+
+def winding_number(p, vertices, faces):
+    """1 inside of a closed mesh that faces outwards, 0 outside: solid angles over 4 pi (van Oosterom & Strackee)."""
+    total = 0.0
+    for face in faces:
+        a, b, c = (sub(vertices[i], p) for i in face)
+        la, lb, lc = norm(a), norm(b), norm(c)
+        below = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb
+        total += 2 * math.atan2(dot(a, cross(b, c)), below)
+    return total / (4 * math.pi)

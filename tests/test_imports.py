@@ -27,7 +27,11 @@ HEAVY = (
     "trimesh",
 )
 SOURCES = Path(pm.__file__).parent
-TEXTS = ("engine/support.py", "engine/contact_text.py")  # what kernels import, and a kernel's text
+TEXTS = (
+    "engine/support.py",
+    "engine/contact_text.py",
+    "engine/triangles_text.py",
+)  # what kernels import, and kernels' texts
 
 
 def loaded_by(code: str) -> set[str]:
@@ -78,6 +82,6 @@ def test_numba_is_imported_by_kernels_and_on_first_use_only() -> None:
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             if any(name.split(".")[0] == "numba" for name in names):
-                kernel = path.name.startswith("kernels") or where in ("render/inner.py", *TEXTS)
+                kernel = path.name.startswith("kernels") or where in ("render/inner.py", "engine/inner.py", *TEXTS)
                 lazy = id(node) not in first and where.split("/")[0] in ("render", "engine", "cli")
                 assert kernel or lazy, f"{where} line {node.lineno} imports numba"

@@ -40,6 +40,15 @@ from .collisions import (
     Cylinder as Cylinder,
 )
 from .collisions import (
+    DistanceGrid as DistanceGrid,
+)
+from .collisions import (
+    HeightField as HeightField,
+)
+from .collisions import (
+    Mesh as Mesh,
+)
+from .collisions import (
     Plane as Plane,
 )
 from .collisions import (

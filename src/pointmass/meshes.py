@@ -83,6 +83,9 @@ class TriangleMesh:
         return np.bincount(which.ravel(), way.ravel(), len(pairs)).astype(np.int64)
 
 
+TriangleSource = str | Path | tuple[Any, Any] | TriangleMesh  # what `as_mesh` takes
+
+
 def read_mesh(path: str | Path) -> TriangleMesh:
     """Read the triangles of a file, all its parts together.
 

@@ -36,6 +36,7 @@ from pointmass.toml import dumps
 from pointmass.zones import WHEN_FULL, WhenFull, Zone
 
 VERSION = 1
+PATHS = (".grid", ".mesh", ".heights", ".distances")  # parameters that may be paths
 HOLDS: dict[str, type] = {"bodies": Body, "forces": Force, "colliders": Collider, "emitters": Emitter, "zones": Zone}
 PLAIN = ("name", "summary", "dt", "frames", "fps", "seed", "dtype", "max_particles", "when_full")
 
@@ -355,7 +356,9 @@ def _plain(value: Any, where: str, folder: Path | None) -> Any:
         return {str(k): _plain(v, where, folder) for k, v in value.items() if v is not None}
     if isinstance(value, (list, tuple, range)):
         return [_plain(v, where, folder) for v in value]
-    if isinstance(value, Path) or (isinstance(value, str) and where.endswith((".grid", ".mesh"))):
+    if isinstance(value, TriangleMesh):
+        return [value.vertices.tolist(), value.faces.tolist()]
+    if isinstance(value, Path) or (isinstance(value, str) and where.endswith(PATHS)):
         return _way(value, folder)
     if isinstance(value, (str, bool, int, float)):
         return value
@@ -402,8 +405,9 @@ def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, fol
             values["around"] = [_made(COLLIDERS, solid, f"{where}.around.{k}", folder) for k, solid in solids]
         if "grid" in values:
             values["grid"] = _grid(values["grid"], folder)
-        if isinstance(values.get("mesh"), str):
-            values["mesh"] = _found(values["mesh"], "mesh", folder)
+        for name in ("mesh", "heights", "distances"):
+            if isinstance(values.get(name), str):
+                values[name] = _found(name, values[name], folder)
         return registry[kind](**values)
     except InvalidInput as error:
         raise InvalidInput(f"{where} ({kind}): {error}") from None
@@ -413,14 +417,14 @@ def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, fol
 
 def _grid(value: Any, folder: Path | None) -> Any:
     settings = dict(value) if isinstance(value, Mapping) else {"path": value}
-    path = _found(str(settings.pop("path")), "grid", folder)
+    path = _found("grid", str(settings.pop("path")), folder)
     return load_grid(path, **settings) if settings else path
 
 
-def _found(path: str, what: str, folder: Path | None) -> str:
-    """The path of a file that is found again from wherever this scene, or a cache that keeps its text, is read."""
+def _found(name: str, path: str, folder: Path | None) -> str:
+    """A path such that it is found again from wherever this scene, or a cache that keeps its text, is read."""
     if "\0" in path:
-        raise InvalidInput(f"{what} = {path!r} is not allowed: no file has a name with a zero character")
+        raise InvalidInput(f"{name} = {path!r} is not allowed: no file has a name with a zero character")
     return path if folder is None else str((folder / path).resolve())
 
 

@@ -21,6 +21,10 @@ SURFACES = [
     pm.Capsule((-1, 0, 0), (1, 1, 0), radius=3, inside=True),
     pm.Cylinder((-0.5, -0.5, 0), (0.5, 0.3, 0.2), radius=0.6),
     *pm.Cylinder((0, -3, 0), (1, 3, 0), radius=3, inside=True).surfaces,
+    pm.Mesh(([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])),
+    pm.Mesh(([[-1, 0, -1], [-1, 0, 1], [1, 0.4, 1], [1, 0, -1]], [[0, 1, 2], [0, 2, 3]]), shift=("sin(3*t)", 0, 0)),
+    pm.DistanceGrid(np.linalg.norm(np.indices((9, 9, 9)) - 4.0, axis=0) / 4 - 0.6, spacing=0.25),
+    pm.HeightField([[0.1, 0.5, -0.3], [0.2, -0.6, 0.3], [0.0, 0.1, 0.4]], (3, 3)),
 ]
 
 

@@ -45,11 +45,15 @@ class Collider(Described, ABC):
     bulges : True where the solid is convex (ball, block): a line between two free points may pass through it. False
         where the free space is convex (plane, inside of a sphere).
     curved : False where the surface is flat everywhere, and only there.
+    lookup : in what kind of data the distance is looked up: see `LookedUp`. "" where laws give it.
+    steepness : the distance changes by at most so many times the way, 1 or more.
     smooth : True where pictures shade its mesh round.
     """
 
     bulges: ClassVar[bool] = True
     curved: ClassVar[bool] = True
+    lookup: ClassVar[str] = ""
+    steepness: float = 1.0
     smooth: ClassVar[bool] = False
     place: ClassVar[str] = "center"
 

@@ -325,12 +325,13 @@ class Contacts:
         local = x[rows] - place
         normal = surface.local_normal(local)
         gap = surface.local_distance(local) - radius[rows] - stand.level
-        on = go & (h[rows] > 0) & (stand.pressed | (gap < 0))
+        pressed = stand.pressed & ~(gap > surface.eps) if surface.lookup else stand.pressed  # or it went over an edge
+        on = go & (h[rows] > 0) & (pressed | (gap < 0))
         off = np.where(on & ((gap < 0) | (gap > surface.eps)), gap, 0)
         x[rows] = np.where(on[:, None], x[rows] - off[:, None] * normal, x[rows])
         if self.order == 2:
             speed = rows_dot(v[rows] - motion, normal)
-            across = on & (stand.pressed | (speed < 0))
+            across = on & (pressed | (speed < 0))
             v[rows] = np.where(across[:, None], v[rows] - speed[:, None] * normal, v[rows])
         moved: Mask = np.abs(off) > _roundoff(x[rows], place)
         return moved

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +13,8 @@ from pointmass.emitters.shaped import ShapedEmitter
 from pointmass.emitters.solid import Solid
 from pointmass.emitters.sphere import Where, check_where
 from pointmass.errors import InvalidInput
-from pointmass.meshes import TriangleMesh, as_mesh
+from pointmass.meshes import TriangleMesh, TriangleSource, as_mesh
 
-TriangleSource = str | Path | tuple[Any, Any] | TriangleMesh
 LEAST = 1e-3  # of the columns that hold a solid, inside of it
 
 

@@ -1,21 +1,21 @@
 """Prints what the colliders do to a particle as functions of scalars, for kernels: the same bits as the reference path.
 
 `ContactText(surfaces_of(system), order, lagged, dtype)` holds the text; put it before the text of the kernel. Numbers
-of surfaces are data: `table()` gives them, one row each, for the argument P. What is compiled are the kinds of surface
-and the programs of those that move. A particle's contacts are `record` numbers of a flat float64 scratch array C from
-an offset o on. All arithmetic is float64, also where the state is float32; positions, velocities and forces are three
-scalars each.
+of surfaces are data: `table()` gives them, one row each, for the argument P, and behind the rows what is looked up in
+meshes. What is compiled are the kinds of surface and the programs of those that move. A particle's contacts, and what
+was looked up for it last, are `record` numbers of a flat float64 scratch array C from an offset o on; at first they are
+0. All arithmetic is float64, also where the state is float32; positions, velocities and forces are three scalars each.
 
 For one particle, in the order of the reference path (a pinned one is left out, with C[o] = 0):
 
-    near(P, t, x, radius) -> bool                                         is `find` needed? Else C[o] = 0.
+    near(P, C, o, t, x, radius) -> bool                                       is `find` needed? Else C[o] = 0.
     find(P, C, o, t, x, v, m, a, radius) -> v                             before each trial; a: unfiltered acceleration
     bear(P, C, o, t, x, v, m, f) -> f                                     in deriv_eval, on the sum of all forces
     project(P, C, o, matrix, scratch)                                     of a lagged filter: 9 numbers, with 18 scratch
     settle(P, C, o, t + h, h, x, v, radius) -> x, v                       after each kept step, and what follows too
-    bounce(P, t + h, x, v, radius) -> x, v, hit
+    bounce(P, C, o, t + h, x, v, radius) -> x, v, hit
     strike(P, C, o, alone, events, x0, v0, x, v, t, h, radius) -> x, v, clock, events, ground
-    evict(P, clock, x, v, radius, x at the start of the whole step, when that was) -> x, v
+    evict(P, C, o, clock, x, v, radius, x at the start of the whole step, when that was) -> x, v
 
 `strike` hit something where it returns more events than it was given; then and where `bounce` hit, the solver starts
 anew. Events and hits from KILLED on are deadly: the particle is to be taken away when the step ends. One that is
@@ -33,7 +33,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import get_args
 
 import numpy as np
@@ -41,6 +40,8 @@ from numpy.typing import NDArray
 
 from pointmass.collisions import contact, swept
 from pointmass.collisions.collider import Collider, Response
+from pointmass.collisions.looked_up import LookedUp
+from pointmass.engine.lookups import TEXTS, body_of
 from pointmass.engine.printing import indented, literal, statements
 from pointmass.engine.reference import EVICTIONS, KILLED, MOST_EVENTS
 from pointmass.laws.parameter import Component, Parameter
@@ -49,15 +50,15 @@ from pointmass.tracing.trace import Traced, vector_names
 
 TABLE = (  # columns of a surface's row
     *("KIND", "SWEPT", "MOTION", "BULGES", "FLAT", "RESPONSE", "RESTITUTION", "FRICTION"),
-    *("NEAR", "ROOM"),
+    *("NEAR", "ROOM", "LOOKUP", "STEEP", "DATA"),
     *("PLACE", "", "", "SHAPE"),
 )
 RECORD = {  # of a contact, with the size of each
     **{"ON": 1, "LEVEL": 1, "START": 3, "SLIDE": 3, "SPEED": 1, "LOAD": 1, "GIVEN": 3, "NORMAL": 3},
     **{"PRESSED": 1, "HELD": 1, "STICKS": 1, "CARRIED": 3, "BEND": 1},
 }
+REMEMBERED = 9  # numbers: whether there is a point, its place, distance and normal, and where in the data they are from
 RESPONSES = get_args(Response)
-MARK = "# --- printed from here on\n"
 ROUNDING = {"float64": 1e-13, "float32": 1e-6}  # of the places between which `clear` looks, on top of eps
 PATH = [f"{p}{end}" for end in "01" for p in ("x", "y", "z", "u", "v", "w")]
 
@@ -78,31 +79,46 @@ class ContactText:
     record : how many numbers of scratch a particle takes.
     kills : whether a surface kills.
     discrete : whether there is anything to `bounce` off.
+    looks_up : whether the distance of a surface is looked up in data.
     """
 
     def __init__(self, surfaces: Sequence[Collider], order: int, lagged: bool, dtype: str) -> None:
         self.surfaces, self._dtype = surfaces, dtype
-        self.record = 1 + sum(RECORD.values()) * len(surfaces)
-        self._kinds = list(dict.fromkeys(s.laws for s in surfaces))
+        self._memory = 1 + sum(RECORD.values()) * len(surfaces)
+        self.looks_up = any(s.lookup for s in surfaces)
+        self.record = self._memory + REMEMBERED * len(surfaces) * self.looks_up
+        self._kinds = list(dict.fromkeys(s.lookup or s.laws for s in surfaces))
+        self._row = TABLE.index("SHAPE") + max((len(s.shape) for s in surfaces), default=0)
+        blocks = [s.data if isinstance(s, LookedUp) else np.zeros(0) for s in surfaces]
+        self._starts = self._row * len(surfaces) + np.cumsum([0, *(b.size for b in blocks)])[:-1]
+        self._table = np.concatenate([np.zeros(self._row * len(surfaces)), *blocks])
         self._motions = list({id(s.motion): s.motion for s in surfaces if s.moves}.values())
-        body = Path(__file__).with_name("contact_text.py").read_text(encoding="utf-8").split(MARK)[1]
         self.kills = any(s.response == "kill" for s in surfaces)
         self.discrete = order == 2 and any(s.contact == "discrete" for s in surfaces)
         printed = [*self._constants(order, lagged), "", *self._laws(), *self._places()]
-        self.text = "\n".join([*printed, body.strip("\n"), "", "", *self._clear()])
+        self.text = "\n".join([*printed, body_of("contact_text.py"), *self._lookups(), *self._clear()])
 
     def table(self) -> NDArray[np.float64]:
-        """The numbers of the surfaces now, one row each."""
-        first = TABLE.index("SHAPE")
-        result = np.zeros((len(self.surfaces), first + max((len(s.shape) for s in self.surfaces), default=0)))
-        for row, s in zip(result, self.surfaces, strict=True):
+        """The numbers of the surfaces now, one row each, and their data behind. The next call changes this array."""
+        rows = self._table[: self._row * len(self.surfaces)].reshape(len(self.surfaces), self._row)
+        for k, (row, s) in enumerate(zip(rows, self.surfaces, strict=True)):
             motion = 1 + [id(m) for m in self._motions].index(id(s.motion)) if s.moves else 0
             place = [c.value if isinstance(c.value, float) else 0.0 for c in s.motion.parameters[0].components]
             room = s.eps + ROUNDING[self._dtype] * float(np.abs(place).sum())
-            numbers: list[float] = [self._kinds.index(s.laws), s.contact == "swept", motion, s.bulges, _flat(s)]
-            numbers += [RESPONSES.index(s.response), *s.impact, s.eps, room, *place, *s.shape]
+            kind = self._kinds.index(s.lookup or s.laws)
+            numbers: list[float] = [kind, s.contact == "swept", motion, s.bulges, _flat(s)]
+            numbers += [
+                RESPONSES.index(s.response),
+                *s.impact,
+                s.eps,
+                room,
+                bool(s.lookup),
+                s.steepness,
+                self._starts[k],
+            ]
+            numbers += [*place, *s.shape]
             row[: len(numbers)] = numbers
-        return result
+        return self._table
 
     def _constants(self, order: int, lagged: bool) -> list[str]:
         """Names for numbers, and which branches there are: those that no surface takes are not compiled."""
@@ -116,7 +132,11 @@ class ContactText:
         numbers |= {"MOST_EVENTS": MOST_EVENTS, "EVICTIONS": EVICTIONS, "SETTLED": contact.SETTLED}
         rounding = contact.STILL * float(np.finfo(self._dtype).eps)
         numbers |= {"ROUND": rounding, "CREEP": max(contact.CREEP, rounding)}
+        numbers |= {"MARGIN": swept.MARGIN, "MOST_LOOKS": swept.MOST_LOOKS, "SURFACES": len(self.surfaces)}
+        numbers |= {"ROW": self._row, "MEMORY": self._memory, "REMEMBERED": REMEMBERED}
         flat = [_flat(s) for s in self.surfaces]
+        numbers |= {"LOOKUPS": self.looks_up}
+        numbers |= {"CHORDS": not all(f or s.lookup for f, s in zip(flat, self.surfaces, strict=True))}
         numbers |= {"KILLS": self.kills, "STICKY": any(s.response == "stick" for s in self.surfaces)}
         numbers |= {"FLATS": any(flat), "CURVED": not all(flat), "MOVING": bool(self._motions)}
         numbers |= {"BULGING": any(s.bulges for s, f in zip(self.surfaces, flat, strict=True) if not f)}
@@ -128,24 +148,44 @@ class ContactText:
         """`gap_of`, `normal_of` and `bending_of`."""
         x, v = ["x", "y", "z"], ["u", "v", "w"]
         lines = []
-        for name, arguments, programs in (
-            ("gap_of", x, [k.distance for k in self._kinds]),
-            ("normal_of", x, [k.normal for k in self._kinds]),
-            ("bending_of", [*x, *v], [k.bending for k in self._kinds]),
+        found = {"gap_of": "return C[at]", "normal_of": "return C[at + 1], C[at + 2], C[at + 3]"}
+        for name, memory, arguments, law in (
+            ("gap_of", "C, o, ", x, "distance"),
+            ("normal_of", "C, o, ", x, "normal"),
+            ("bending_of", "", [*x, *v], "bending"),
         ):
             names = {**_vector("x", "x", "y", "z"), **_vector("v", "u", "v", "w")}
-            cases = [_case(p, names | _shape("k", p)) for p in programs]
-            lines += _dispatched(f"{name}(P, k, {', '.join(arguments)})", "int(P[k, KIND])", cases)
+            cases = []
+            for kind in self._kinds:
+                if not isinstance(kind, str):
+                    program = getattr(kind, law)
+                    cases.append(_case(program, names | _shape("k", program)))
+                elif name == "bending_of":
+                    cases.append(["return 0.0"])
+                else:
+                    cases.append(["at = remembered(P, C, o, k, x, y, z)", found[name]])
+            lines += _dispatched(f"{name}(P, {memory}k, {', '.join(arguments)})", "int(P[k * ROW + KIND])", cases)
         return lines
+
+    def _lookups(self) -> list[str]:
+        """The search in data, and `look_of`, which does that of a surface."""
+        names = [(j, kind) for j, kind in enumerate(self._kinds) if isinstance(kind, str)]
+        texts = [TEXTS[kind](TABLE.index("SHAPE")) for _, kind in names]
+        *several, last = [[f"return {kind}_look(P, k, x, y, z, guess)"] for _, kind in names] or [[]]
+        if not last:
+            return []
+        keyed = ["which = int(P[k * ROW + KIND])"] if several else []
+        keyed += [line for (j, _), case in zip(names, several, strict=False) for line in _when(j, case)]
+        return [*texts, "@njit(**FLAGS)", "def look_of(P, k, x, y, z, guess):", *indented([*keyed, *last], 1), "", ""]
 
     def _places(self) -> list[str]:
         """`place_of`, `ground_of` and `push_of`."""
         lines = []
         for which, name in enumerate(("place_of", "ground_of", "push_of")):
-            still = ["P[k, PLACE]", "P[k, PLACE + 1]", "P[k, PLACE + 2]"] if which == 0 else ["0.0"] * 3
+            still = [f"P[k * ROW + PLACE + {j}]" for j in range(3)] if which == 0 else ["0.0"] * 3
             cases = [[f"return {', '.join(still)}"]]
             cases += [_moving(m.parameters[which], f"m{j}_", "t", still) for j, m in enumerate(self._motions)]
-            lines += _dispatched(f"{name}(P, k, t)", "int(P[k, MOTION])", cases)
+            lines += _dispatched(f"{name}(P, k, t)", "int(P[k * ROW + MOTION])", cases)
         return lines
 
     # ------------------------------------------------------------------------------------------------ clear
@@ -176,7 +216,9 @@ class ContactText:
                 lines.begin.append("safe = True")
                 lines.lane.append(f"far = radius + {rounding} * ({' + '.join(f'abs({p})' for p in PATH[6:9])})")
                 lines.results.append("safe")
-            if surface.laws.apart is not None and not surface.moves:
+            if surface.lookup:
+                self._clear_by_bound(k, surface.lookup, dtype, table, lines)
+            elif surface.laws.apart is not None and not surface.moves:
                 self._clear_by_hull(k, surface.laws.apart, dtype, table, lines)
             else:
                 self._clear_by_distance(k, dtype, table, lines)
@@ -187,8 +229,8 @@ class ContactText:
         that are a third of a step away from an end at its velocity."""
         tag, surface = f"q{k}_", self.surfaces[k]
         laws = surface.laws
-        lines.once += [f"{tag}{a} = R({table}[{k}, PLACE + {j}])" for j, a in enumerate("xyz")]
-        lines.once.append(f"{tag}room = R({table}[{k}, ROOM])")
+        lines.once += [f"{tag}{a} = R({table}[{k} * ROW + PLACE + {j}])" for j, a in enumerate("xyz")]
+        lines.once.append(f"{tag}room = R({table}[{k} * ROW + ROOM])")
         numbers = _numbers(lines.once, tag, k, laws.distance, table) | _numbers(lines.once, tag, k, laws.normal, table)
         _, normal = statements(expanded(laws.normal.program), numbers, f"{tag}n_", dtype)
         origin = _vector("x", *(f"(-{tag}{a})" for a in "xyz"))
@@ -212,8 +254,8 @@ class ContactText:
     def _clear_by_hull(self, k: int, apart: Traced, dtype: str, table: str, lines: ClearLines) -> None:
         """The hull of the control points is apart from the surface."""
         tag = f"q{k}_"
-        lines.once += [f"{tag}{a} = R({table}[{k}, PLACE + {j}])" for j, a in enumerate("xyz")]
-        lines.once.append(f"{tag}room = R({table}[{k}, ROOM])")
+        lines.once += [f"{tag}{a} = R({table}[{k} * ROW + PLACE + {j}])" for j, a in enumerate("xyz")]
+        lines.once.append(f"{tag}room = R({table}[{k} * ROW + ROOM])")
         inner = [
             f"{c}{a} = {a}{e} {s} third * {b}{e}"
             for c, e, s in ("a0+", "c1-")
@@ -229,19 +271,8 @@ class ContactText:
 
     def _clear_by_distance(self, k: int, dtype: str, table: str, lines: ClearLines) -> None:
         """The start is farther away than the whole way of particle and surface, and the end is free."""
-        tag, surface = f"q{k}_", self.surfaces[k]
-        law = surface.laws.distance
-        for j, time in enumerate(("t0", "t0 + h")):
-            lines.step.append(", ".join(f"{tag}{a}{j}d" for a in "xyz") + f" = place_of({table}, {k}, {time})")
-            lines.step += [f"{tag}{a}{j} = R({tag}{a}{j}d)" for a in "xyz"]
-        lines.once.append(f"{tag}near = R({table}[{k}, NEAR])")
-        if surface.moves:
-            moved = ", ".join(f"{tag}{a}1d - {tag}{a}0d" for a in "xyz")
-            lines.step.append(f"{tag}way = R(length3({moved}) + swing_of({table}, {k}, t0, h))")
-        else:
-            lines.once.append(f"{tag}way = R(0)")
-        if not any(line.startswith("way =") for line in lines.lane):
-            lines.lane.append(f"way = {' + '.join(f'abs({p})' for p in _legs())}")
+        tag, law = f"q{k}_", self.surfaces[k].laws.distance
+        self._way(k, table, lines)
         numbers = _numbers(lines.once, tag, k, law, table)
         gaps = []
         for j in range(2):
@@ -252,6 +283,29 @@ class ContactText:
         wide = literal(1.000001, dtype)
         away = f"({gaps[0]} > {tag}near + {wide} * (way + {tag}way)) & ({gaps[1]} > {tag}near)"
         lines.lane.append(f"safe = safe & {away}")
+
+    def _clear_by_bound(self, k: int, lookup: str, dtype: str, table: str, lines: ClearLines) -> None:
+        """The start is farther away than the whole way by the bound that the surface's data give at once."""
+        tag, wide = f"q{k}_", literal(1.000001, dtype)
+        self._way(k, table, lines)
+        place = ", ".join(f"np.float64({a}0 - {tag}{a}0)" for a in "xyz")
+        lines.lane.append(f"{tag}gap = R({lookup}_bound({table}, {k}, {place})) - far")
+        lines.lane.append(f"safe = safe & ({tag}gap > {tag}near + {wide} * (way + {tag}way))")
+
+    def _way(self, k: int, table: str, lines: ClearLines) -> None:
+        """Where the surface is at the beginning and the end of a step, and the ways of surface and particle."""
+        tag, surface = f"q{k}_", self.surfaces[k]
+        for j, time in enumerate(("t0", "t0 + h")):
+            lines.step.append(", ".join(f"{tag}{a}{j}d" for a in "xyz") + f" = place_of({table}, {k}, {time})")
+            lines.step += [f"{tag}{a}{j} = R({tag}{a}{j}d)" for a in "xyz"]
+        lines.once.append(f"{tag}near = R({table}[{k} * ROW + NEAR])")
+        if surface.moves:
+            moved = ", ".join(f"{tag}{a}1d - {tag}{a}0d" for a in "xyz")
+            lines.step.append(f"{tag}way = R(length3({moved}) + swing_of({table}, {k}, t0, h))")
+        else:
+            lines.once.append(f"{tag}way = R(0)")
+        if not any(line.startswith("way =") for line in lines.lane):
+            lines.lane.append(f"way = {' + '.join(f'abs({p})' for p in _legs())}")
 
 
 @dataclass
@@ -309,13 +363,13 @@ def _count(law: Traced) -> int:
 
 
 def _shape(k: str, law: Traced) -> dict[str, str]:
-    return {f"s{j}": f"P[{k}, SHAPE + {j}]" for j in range(_count(law))}
+    return {f"s{j}": f"P[{k} * ROW + SHAPE + {j}]" for j in range(_count(law))}
 
 
 def _numbers(before: list[str], tag: str, k: int, law: Traced, table: str) -> dict[str, str]:
     """Names of locals for the numbers of a shape, read in `before`."""
     used = [j for j in range(_count(law)) if f"s{j}" in law.program.arguments()]
-    before += [f"{tag}s{j} = R({table}[{k}, SHAPE + {j}])" for j in used]
+    before += [f"{tag}s{j} = R({table}[{k} * ROW + SHAPE + {j}])" for j in used]
     return {f"s{j}": f"{tag}s{j}" for j in used}
 
 
@@ -342,9 +396,12 @@ def _component(component: Component, prefix: str, t: str, still: str, lines: lis
 def _dispatched(head: str, key: str, cases: Iterable[Sequence[str]]) -> list[str]:
     """A function that does one of several things, by a number of the surface."""
     *several, last = cases
-    lines = ["@njit(**FLAGS)", f"def {head}:"]
-    if several:
-        lines.append(f"    which = {key}")
+    lines = [f"which = {key}"] if several else []
     for number, case in enumerate(several):
-        lines += [f"    if which == {number}:", *indented(list(case), 2)]
-    return [*lines, *indented(list(last), 1), "", ""]
+        lines += _when(number, case)
+    return ["@njit(**FLAGS)", f"def {head}:", *indented([*lines, *last], 1), "", ""]
+
+
+def _when(number: int, case: Sequence[str]) -> list[str]:
+    """Statements of the surfaces of a kind, or with a motion."""
+    return [f"if which == {number}:", *indented(list(case), 1)]

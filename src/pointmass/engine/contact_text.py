@@ -32,22 +32,32 @@ def size3(x, y, z):
 
 
 @njit(**FLAGS)
-def distance(P, k, t, x, y, z):
+def distance(P, C, o, k, t, x, y, z):
     """Signed distance of surface k."""
     px, py, pz = place_of(P, k, t)
-    return gap_of(P, k, x - px, y - py, z - pz)
+    return gap_of(P, C, o, k, x - px, y - py, z - pz)
+
+
+@njit(**FLAGS)
+def remembered(P, C, o, k, x, y, z):
+    """Where the distance and the normal of surface k, one that is looked up, are kept for a point: it asks in turns."""
+    m = o + MEMORY + REMEMBERED * k
+    if not (C[m] == 1.0 and C[m + 1] == x and C[m + 2] == y and C[m + 3] == z):
+        C[m], C[m + 1], C[m + 2], C[m + 3] = 1.0, x, y, z
+        C[m + 4], C[m + 5], C[m + 6], C[m + 7], C[m + 8] = look_of(P, k, x, y, z, int(C[m + 8]))
+    return m + 4
 
 
 # ------------------------------------------------------------------------------------------------- resting contact
 
 
 @njit(**FLAGS)
-def near(P, t, x, y, z, radius):
+def near(P, C, o, t, x, y, z, radius):
     """Whether a particle is within reach of a surface: if so, `find` wants to know its acceleration."""
-    for k in range(len(P)):
-        if KILLS and P[k, RESPONSE] == KILL:
+    for k in range(SURFACES):
+        if KILLS and P[k * ROW + RESPONSE] == KILL:
             continue
-        if distance(P, k, t, x, y, z) - radius <= P[k, NEAR]:
+        if distance(P, C, o, k, t, x, y, z) - radius <= P[k * ROW + NEAR]:
             return True
     return False
 
@@ -56,15 +66,15 @@ def near(P, t, x, y, z, radius):
 def find(P, C, o, t, x, y, z, vx, vy, vz, m, ax, ay, az, radius):
     """Who stands on what: Contacts.find. Returns the velocity, stopped."""
     count = 0
-    for k in range(len(P)):
+    for k in range(SURFACES):
         px, py, pz = place_of(P, k, t)
         lx, ly, lz = x - px, y - py, z - pz
-        gap = gap_of(P, k, lx, ly, lz) - radius
-        if KILLS and P[k, RESPONSE] == KILL:
+        gap = gap_of(P, C, o, k, lx, ly, lz) - radius
+        if KILLS and P[k * ROW + RESPONSE] == KILL:
             continue
-        if not gap <= P[k, NEAR]:
+        if not gap <= P[k * ROW + NEAR]:
             continue
-        nx, ny, nz = normal_of(P, k, lx, ly, lz)
+        nx, ny, nz = normal_of(P, C, o, k, lx, ly, lz)
         gx, gy, gz = ground_of(P, k, t)
         if ORDER == 1:
             lift = dot3(ax - gx, ay - gy, az - gz, nx, ny, nz)
@@ -73,15 +83,15 @@ def find(P, C, o, t, x, y, z, vx, vy, vz, m, ax, ay, az, radius):
             ux, uy, uz = vx - gx, vy - gy, vz - gz
             bx, by, bz = push_of(P, k, t)
             lift = dot3(ax - bx, ay - by, az - bz, nx, ny, nz) + bending_of(P, k, lx, ly, lz, ux, uy, uz)
-            slow = abs(dot3(ux, uy, uz, nx, ny, nz)) <= np.sqrt(2 * P[k, NEAR] * abs(lift))
+            slow = abs(dot3(ux, uy, uz, nx, ny, nz)) <= np.sqrt(2 * P[k * ROW + NEAR] * abs(lift))
             stands = lift < 0 and slow
         if STICKY:
-            stands = stands or P[k, RESPONSE] == STICK
+            stands = stands or P[k * ROW + RESPONSE] == STICK
         if stands:
             r = o + 1 + RECORD * count
             count += 1
             C[r + ON] = k
-            C[r + LEVEL] = gap if gap < -P[k, NEAR] else 0.0
+            C[r + LEVEL] = gap if gap < -P[k * ROW + NEAR] else 0.0
             C[r + START], C[r + START + 1], C[r + START + 2] = lx, ly, lz
             C[r + SLIDE], C[r + SLIDE + 1], C[r + SLIDE + 2] = 0.0, 0.0, 0.0
             C[r + SPEED] = 0.0
@@ -113,14 +123,14 @@ def choose_slide(P, C, r, t, vx, vy, vz, m, ax, ay, az):
     """Contacts._choose_slide; returns the velocity."""
     k = int(C[r])
     gx, gy, gz = ground_of(P, k, t)
-    if STICKY and P[k, RESPONSE] == STICK:
+    if STICKY and P[k * ROW + RESPONSE] == STICK:
         return gx, gy, gz
     nx, ny, nz = C[r + NORMAL], C[r + NORMAL + 1], C[r + NORMAL + 2]
     ux, uy, uz = vx - gx, vy - gy, vz - gz
     across = dot3(ux, uy, uz, nx, ny, nz)
     ux, uy, uz = ux - across * nx, uy - across * ny, uz - across * nz
     speed = length3(ux, uy, uz)
-    bounce = np.sqrt(2 * P[k, NEAR] * C[r + LOAD] / m)
+    bounce = np.sqrt(2 * P[k * ROW + NEAR] * C[r + LOAD] / m)
     if not speed > ROUND * (size3(vx, vy, vz) + size3(gx, gy, gz)) + CREEP * bounce:
         speed = 0.0
     C[r + SPEED] = speed
@@ -134,7 +144,7 @@ def choose_slide(P, C, r, t, vx, vy, vz, m, ax, ay, az):
             across = dot3(bx, by, bz, nx, ny, nz)
             bx, by, bz = bx - across * nx, by - across * ny, bz - across * nz
             pull = length3(bx, by, bz)
-            if pull * m > P[k, FRICTION] * C[r + LOAD] and pull > 0:
+            if pull * m > P[k * ROW + FRICTION] * C[r + LOAD] and pull > 0:
                 C[r + SLIDE], C[r + SLIDE + 1], C[r + SLIDE + 2] = bx / pull, by / pull, bz / pull
     C[r + STICKS] = C[r + SLIDE] == 0 and C[r + SLIDE + 1] == 0 and C[r + SLIDE + 2] == 0
     return vx, vy, vz
@@ -151,7 +161,7 @@ def bear(P, C, o, t, x, y, z, vx, vy, vz, m, fx, fy, fz):
         k = int(C[r])
         px, py, pz = place_of(P, k, t)
         lx, ly, lz = x - px, y - py, z - pz
-        C[r + NORMAL], C[r + NORMAL + 1], C[r + NORMAL + 2] = normal_of(P, k, lx, ly, lz)
+        C[r + NORMAL], C[r + NORMAL + 1], C[r + NORMAL + 2] = normal_of(P, C, o, k, lx, ly, lz)
         C[r + GIVEN], C[r + GIVEN + 1], C[r + GIVEN + 2] = 0.0, 0.0, 0.0
         gx, gy, gz = ground_of(P, k, t)
         if ORDER == 1:
@@ -183,7 +193,7 @@ def bear_one(P, C, r, friction, fx, fy, fz):
     nx, ny, nz = C[r + NORMAL], C[r + NORMAL + 1], C[r + NORMAL + 2]
     qx, qy, qz = fx - C[r + GIVEN], fy - C[r + GIVEN + 1], fz - C[r + GIVEN + 2]
     qx, qy, qz = qx - C[r + CARRIED], qy - C[r + CARRIED + 1], qz - C[r + CARRIED + 2]
-    if STICKY and P[k, RESPONSE] == STICK:
+    if STICKY and P[k * ROW + RESPONSE] == STICK:
         C[r + HELD] = 1.0
         return give(C, r, -qx, -qy, -qz, fx, fy, fz)
     into = dot3(qx, qy, qz, nx, ny, nz)
@@ -195,14 +205,14 @@ def bear_one(P, C, r, friction, fx, fy, fz):
         if not load > 0:
             load = 0.0
     wx, wy, wz = load * nx, load * ny, load * nz
-    if friction and ORDER == 2 and P[k, FRICTION] > 0:
+    if friction and ORDER == 2 and P[k * ROW + FRICTION] > 0:
         hx, hy, hz = qx - into * nx, qy - into * ny, qz - into * nz
         sticks = C[r + STICKS] != 0
         if LAGGED:
-            most = P[k, FRICTION] * C[r + LOAD]
+            most = P[k * ROW + FRICTION] * C[r + LOAD]
             C[r + HELD] = C[r + STICKS]
         else:
-            most = P[k, FRICTION] * load
+            most = P[k * ROW + FRICTION] * load
             size = length3(hx, hy, hz)
             C[r + HELD] = sticks and size <= most
             part = min(most / (size if size > 0 else 1.0), 1.0)
@@ -238,7 +248,7 @@ def project(P, C, o, a, w):
     b, across = w[:9], w[9:]
     for c in range(count):
         r = o + 1 + RECORD * c
-        if C[r + STICKS] != 0 and P[int(C[r]), FRICTION] > 0:
+        if C[r + STICKS] != 0 and P[int(C[r]) * ROW + FRICTION] > 0:
             for i in range(9):
                 a[i] = 0.0
             continue
@@ -264,9 +274,9 @@ def settle(P, C, o, t, h, x, y, z, vx, vy, vz, radius):
     for c in range(count):
         r = o + 1 + RECORD * c
         k = int(C[r])
-        holds = ORDER == 2 and P[k, FRICTION] != 0
+        holds = ORDER == 2 and P[k * ROW + FRICTION] != 0
         if STICKY:
-            holds = holds or P[k, RESPONSE] == STICK
+            holds = holds or P[k * ROW + RESPONSE] == STICK
         if not holds:
             continue
         px, py, pz = place_of(P, k, t)
@@ -289,12 +299,14 @@ def settle(P, C, o, t, h, x, y, z, vx, vy, vz, radius):
             k = int(C[r])
             px, py, pz = place_of(P, k, t)
             lx, ly, lz = x - px, y - py, z - pz
-            gap = gap_of(P, k, lx, ly, lz) - radius - C[r + LEVEL]
+            gap = gap_of(P, C, o, k, lx, ly, lz) - radius - C[r + LEVEL]
             pressed = C[r + PRESSED] != 0
+            if LOOKUPS:
+                pressed = pressed and not (P[k * ROW + LOOKUP] != 0 and gap > P[k * ROW + NEAR])
             if not (pressed or gap < 0):
                 continue
-            nx, ny, nz = normal_of(P, k, lx, ly, lz)
-            off = gap if gap < 0 or gap > P[k, NEAR] else 0.0
+            nx, ny, nz = normal_of(P, C, o, k, lx, ly, lz)
+            off = gap if gap < 0 or gap > P[k * ROW + NEAR] else 0.0
             x, y, z = x - off * nx, y - off * ny, z - off * nz
             if ORDER == 2:
                 gx, gy, gz = ground_of(P, k, t)
@@ -327,26 +339,26 @@ def respond(vx, vy, vz, nx, ny, nz, gx, gy, gz, restitution, friction):
 
 
 @njit(**FLAGS)
-def bounce(P, t, x, y, z, vx, vy, vz, radius):
+def bounce(P, C, o, t, x, y, z, vx, vy, vz, radius):
     """The lecture's test at the end of a step, for surfaces of discrete contact: discrete.bounce.
 
     Returns the state, and 1 if something was hit, KILLED if that was deadly, else 0.
     """
     hit = 0
-    for k in range(len(P)):
-        if P[k, SWEPT] != 0:
+    for k in range(SURFACES):
+        if P[k * ROW + SWEPT] != 0:
             continue
         px, py, pz = place_of(P, k, t)
-        gap = gap_of(P, k, x - px, y - py, z - pz) - radius
-        if not gap < P[k, NEAR]:
+        gap = gap_of(P, C, o, k, x - px, y - py, z - pz) - radius
+        if not gap < P[k * ROW + NEAR]:
             continue
-        nx, ny, nz = normal_of(P, k, x - px, y - py, z - pz)
+        nx, ny, nz = normal_of(P, C, o, k, x - px, y - py, z - pz)
         gx, gy, gz = ground_of(P, k, t)
         if dot3(nx, ny, nz, vx - gx, vy - gy, vz - gz) < 0:
             hit = max(hit, 1)
             if KILLS:
-                hit = KILLED if P[k, RESPONSE] == KILL else hit
-            vx, vy, vz = respond(vx, vy, vz, nx, ny, nz, gx, gy, gz, P[k, RESTITUTION], P[k, FRICTION])
+                hit = KILLED if P[k * ROW + RESPONSE] == KILL else hit
+            vx, vy, vz = respond(vx, vy, vz, nx, ny, nz, gx, gy, gz, P[k * ROW + RESTITUTION], P[k * ROW + FRICTION])
             sunk = gap if gap < 0 else 0.0
             x, y, z = x - sunk * nx, y - sunk * ny, z - sunk * nz
     return x, y, z, vx, vy, vz, hit
@@ -403,14 +415,14 @@ def bend_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h):
 
 
 @njit(**FLAGS)
-def enters(P, k, ax, ay, az, bx, by, bz, radius, level):
+def enters(P, C, o, k, ax, ay, az, bx, by, bz, radius, level):
     """Fraction from a at which a convex surface is met on the way to b: swept._newton; infinite if it is not."""
     dx, dy, dz = bx - ax, by - ay, bz - az
     s = 0.0
     for _ in range(NEWTON_STEPS):
         x, y, z = ax + s * dx, ay + s * dy, az + s * dz
-        gap = gap_of(P, k, x, y, z) - radius - level
-        nx, ny, nz = normal_of(P, k, x, y, z)
+        gap = gap_of(P, C, o, k, x, y, z) - radius - level
+        nx, ny, nz = normal_of(P, C, o, k, x, y, z)
         slope = dot3(nx, ny, nz, dx, dy, dz)
         if not slope < 0:
             return np.inf
@@ -432,47 +444,100 @@ def chords_for(bend, eps):
     return int(min(np.ceil(np.sqrt(ratio)), MOST_CHORDS)) if ratio > 1 else 1
 
 
+@njit(**FLAGS)
+def pace_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h):
+    """Bound of the first derivative: Paths.pace."""
+    ax, ay, az, cx, cy, cz = h * u0, h * v0, h * w0, h * u1, h * v1, h * w1
+    middle = length3(3 * (x1 - x0) - ax - cx, 3 * (y1 - y0) - ay - cy, 3 * (z1 - z0) - az - cz)
+    return max(max(length3(ax, ay, az), length3(cx, cy, cz)), middle)
+
+
+@njit(**FLAGS)
+def march(P, C, o, k, gap, pace, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius, level):
+    """Fractions between which a path goes into surface k, and the gaps there: swept._march; the first is infinite where
+    it does not."""
+    s = 0.0
+    least = MARGIN * P[k * ROW + NEAR]
+    for _ in range(MOST_LOOKS):
+        end = s + (gap if gap > least else least) / (pace if pace > 0 else least)
+        end = end if end < 1.0 else 1.0
+        lx, ly, lz = local_at(P, k, end, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h)
+        ahead = gap_of(P, C, o, k, lx, ly, lz) - radius - level
+        if ahead < 0:
+            return s, end, gap, ahead
+        if not s < end < 1.0:
+            return np.inf, np.inf, gap, ahead
+        s, gap = end, ahead
+    return s, s, gap, gap
+
+
 @njit(forceinline=True, **FLAGS)
-def curved_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius):
+def curved_hit(P, C, o, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius):
     """Fraction at which a path first meets surface k: swept.first_hit; infinite where it does not."""
-    start = distance(P, k, t0, x0, y0, z0) - radius
-    end = distance(P, k, t0 + h, x1, y1, z1) - radius
+    start = distance(P, C, o, k, t0, x0, y0, z0) - radius
+    end = distance(P, C, o, k, t0 + h, x1, y1, z1) - radius
     level = min(start, 0.0)
-    moves = P[k, MOTION] != 0
-    swing = 0.0
+    moves = P[k * ROW + MOTION] != 0
+    swing = beyond = 0.0
     way = reach_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h)
     if MOVING and moves:
         px, py, pz = place_of(P, k, t0)
         qx, qy, qz = place_of(P, k, t0 + h)
         swing = swing_of(P, k, t0, h)
-        way = way + length3(qx - px, qy - py, qz - pz) + swing
+        beyond = length3(qx - px, qy - py, qz - pz) + swing
+        way = way + beyond
+    if LOOKUPS and P[k * ROW + LOOKUP] != 0:
+        way = P[k * ROW + STEEP] * way
     if not (start - level < way or end < level):
         return np.inf
+    if LOOKUPS and P[k * ROW + LOOKUP] != 0:
+        pace = pace_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h)
+        if moves:
+            pace = pace + beyond
+        pace = P[k * ROW + STEEP] * pace
+        low, high, g_low, g_high = march(
+            P, C, o, k, start - level, pace,
+            x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius, level,
+        )  # fmt: skip
+        if low < high:
+            low = root(
+                P, C, o, k, low, high, g_low, g_high,
+                x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius, level,
+            )  # fmt: skip
+        return low
+    if CHORDS:
+        return chord_hit(P, C, o, k, swing, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius, level)
+    return np.inf
+
+
+@njit(forceinline=True, **FLAGS)
+def chord_hit(P, C, o, k, swing, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius, level):
+    """The same by chords: swept._brackets."""
     bend = bend_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h)
-    if moves:
+    if P[k * ROW + MOTION] != 0:
         bend = bend + swing
-    chords = chords_for(bend, P[k, NEAR])
+    chords = chords_for(bend, P[k * ROW + NEAR])
     ax, ay, az = local_at(P, k, 0.0, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h)
     low = 0.0
     for j in range(1, chords + 1):
         stop = min(j / chords, 1.0)
         bx, by, bz = local_at(P, k, stop, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h)
         high = np.inf
-        if gap_of(P, k, bx, by, bz) - radius - level < 0:
+        if gap_of(P, C, o, k, bx, by, bz) - radius - level < 0:
             high = stop
-        elif BULGING and P[k, BULGES] != 0:
-            enter = enters(P, k, ax, ay, az, bx, by, bz, radius, level)
+        elif BULGING and P[k * ROW + BULGES] != 0:
+            enter = enters(P, C, o, k, ax, ay, az, bx, by, bz, radius, level)
             if enter < np.inf:
-                leave = enters(P, k, bx, by, bz, ax, ay, az, radius, level)
+                leave = enters(P, C, o, k, bx, by, bz, ax, ay, az, radius, level)
                 if enter + leave < 1:
                     high = low + 0.5 * (enter + (1 - leave)) * (stop - low)
         if high < np.inf:
             lx, ly, lz = local_at(P, k, high, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h)
-            g_high = gap_of(P, k, lx, ly, lz) - radius - level
+            g_high = gap_of(P, C, o, k, lx, ly, lz) - radius - level
             if g_high < 0:
-                g_low = gap_of(P, k, ax, ay, az) - radius - level
+                g_low = gap_of(P, C, o, k, ax, ay, az) - radius - level
                 return root(
-                    P, k, low, high, g_low, g_high,
+                    P, C, o, k, low, high, g_low, g_high,
                     x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius, level,
                 )  # fmt: skip
         ax, ay, az = bx, by, bz
@@ -481,14 +546,14 @@ def curved_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radi
 
 
 @njit(forceinline=True, **FLAGS)
-def flat_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius):
+def flat_hit(P, C, o, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius):
     """curved_hit for a flat surface at rest: swept._FlatApproach."""
     px, py, pz = place_of(P, k, t0)
-    nx, ny, nz = normal_of(P, k, x0, y0, z0)
-    start = gap_of(P, k, x0 - px, y0 - py, z0 - pz) - radius
+    nx, ny, nz = normal_of(P, C, o, k, x0, y0, z0)
+    start = gap_of(P, C, o, k, x0 - px, y0 - py, z0 - pz) - radius
     level = min(start, 0.0)
     start = start - level
-    end = gap_of(P, k, x1 - px, y1 - py, z1 - pz) - radius - level
+    end = gap_of(P, C, o, k, x1 - px, y1 - py, z1 - pz) - radius - level
     leave, arrive = h * dot3(nx, ny, nz, u0, v0, w0), h * dot3(nx, ny, nz, u1, v1, w1)
     if not (start + leave / 3 < 0 or end - arrive / 3 < 0 or end < 0):
         return np.inf
@@ -496,7 +561,7 @@ def flat_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius
     square = 3 * rise - (2 * leave + arrive)
     cube = (leave + arrive) - 2 * rise
     bend = max(abs(2 * square), abs(2 * square + 6 * cube))
-    chords = chords_for(bend, P[k, NEAR])
+    chords = chords_for(bend, P[k * ROW + NEAR])
     a, g_low, g_high, b = 0.0, start, end, 1.0
     for j in range(1, chords + 1):
         b = min(j / chords, 1.0)
@@ -517,7 +582,7 @@ def flat_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius
     back = RESOLUTION
     for _ in range(BACK_STEPS):
         lx, ly, lz = local_at(P, k, a, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h)
-        if not (gap_of(P, k, lx, ly, lz) - radius - level < 0 and a > 0):
+        if not (gap_of(P, C, o, k, lx, ly, lz) - radius - level < 0 and a > 0):
             break
         a = max(a - back, 0.0)
         back = 2 * back
@@ -545,14 +610,14 @@ def narrowed(a, b, s, last, gap, slope):
 
 
 @njit(**FLAGS)
-def root(P, k, a, b, g_low, g_high, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius, level):
+def root(P, C, o, k, a, b, g_low, g_high, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius, level):
     """The crossing between a and b, on the free side: swept._root."""
     last = b - a
     s = a + (b - a) * (g_low / (g_low - g_high))
     for _ in range(ROOT_STEPS):
         lx, ly, lz = local_at(P, k, s, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h)
-        gap = gap_of(P, k, lx, ly, lz) - radius - level
-        nx, ny, nz = normal_of(P, k, lx, ly, lz)
+        gap = gap_of(P, C, o, k, lx, ly, lz) - radius - level
+        nx, ny, nz = normal_of(P, C, o, k, lx, ly, lz)
         gx, gy, gz = ground_of(P, k, t0 + s * h)
         ux = velocity(s, h, x0, u0, x1, u1) - gx
         uy = velocity(s, h, y0, v0, y1, v1) - gy
@@ -569,16 +634,16 @@ def first_hits(P, C, o, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, r
     """Earliest hit of a path, and the surface: ReferenceEngine._first_hits. Surfaces that it stands on are left out."""
     theta, which = np.inf, 0
     count = int(C[o])
-    for k in range(len(P)):
-        stands = P[k, SWEPT] == 0
+    for k in range(SURFACES):
+        stands = P[k * ROW + SWEPT] == 0
         for c in range(count):
             stands = stands or C[o + 1 + RECORD * c] == k
         if not stands:
             hit = np.inf
-            if FLATS and P[k, FLAT] != 0:
-                hit = flat_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius)
-            if CURVED and P[k, FLAT] == 0:
-                hit = curved_hit(P, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius)
+            if FLATS and P[k * ROW + FLAT] != 0:
+                hit = flat_hit(P, C, o, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius)
+            if CURVED and P[k * ROW + FLAT] == 0:
+                hit = curved_hit(P, C, o, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius)
             if hit < theta:
                 theta, which = hit, k
     return theta, which
@@ -615,11 +680,11 @@ def strike(P, C, o, alone, events, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w
         end = t0 + h
         events += 1
         if KILLS:
-            events += KILLED if P[k, RESPONSE] == KILL else 0
+            events += KILLED if P[k * ROW + RESPONSE] == KILL else 0
         px, py, pz = place_of(P, k, now)
-        nx, ny, nz = normal_of(P, k, x - px, y - py, z - pz)
+        nx, ny, nz = normal_of(P, C, o, k, x - px, y - py, z - pz)
         gx, gy, gz = ground_of(P, k, now)
-        vx, vy, vz = respond(vx, vy, vz, nx, ny, nz, gx, gy, gz, P[k, RESTITUTION], P[k, FRICTION])
+        vx, vy, vz = respond(vx, vy, vz, nx, ny, nz, gx, gy, gz, P[k * ROW + RESTITUTION], P[k * ROW + FRICTION])
         if events > MOST_EVENTS:
             vx, vy, vz = ground_of(P, k, end)
             qx, qy, qz = place_of(P, k, end)
@@ -639,34 +704,34 @@ def strike(P, C, o, alone, events, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w
 
 
 @njit(**FLAGS)
-def evict(P, t, x, y, z, vx, vy, vz, radius, bx, by, bz, began):
+def evict(P, C, o, t, x, y, z, vx, vy, vz, radius, bx, by, bz, began):
     """Put one out that a surface pushed into another one: ReferenceEngine._evict.
 
     (bx, by, bz) is where it was at `began`, the beginning of the whole step or its birth. Returns the state.
     """
     for _ in range(EVICTIONS):
         clean = True
-        for k in range(len(P)):
-            if ORDER == 1 and P[k, SWEPT] == 0:
+        for k in range(SURFACES):
+            if ORDER == 1 and P[k * ROW + SWEPT] == 0:
                 continue
             px, py, pz = place_of(P, k, t)
-            gap = gap_of(P, k, x - px, y - py, z - pz) - radius
+            gap = gap_of(P, C, o, k, x - px, y - py, z - pz) - radius
             if not gap < 0:
                 continue
-            sunk = min(gap - min(distance(P, k, began, bx, by, bz) - radius, 0.0), 0.0)
+            sunk = min(gap - min(distance(P, C, o, k, began, bx, by, bz) - radius, 0.0), 0.0)
             if sunk < 0:
-                nx, ny, nz = normal_of(P, k, x - px, y - py, z - pz)
+                nx, ny, nz = normal_of(P, C, o, k, x - px, y - py, z - pz)
                 gx, gy, gz = ground_of(P, k, t)
                 x, y, z = x - sunk * nx, y - sunk * ny, z - sunk * nz
                 vx, vy, vz = respond(vx, vy, vz, nx, ny, nz, gx, gy, gz, 0.0, 0.0)
                 clean = clean and not sunk < -ROUND * (1 + size3(x, y, z))
         if clean:
             return x, y, z, vx, vy, vz
-    for k in range(len(P)):
-        if ORDER == 1 and P[k, SWEPT] == 0:
+    for k in range(SURFACES):
+        if ORDER == 1 and P[k * ROW + SWEPT] == 0:
             continue
-        gap = distance(P, k, t, x, y, z) - radius
-        depth = min(distance(P, k, began, bx, by, bz) - radius, 0.0)
+        gap = distance(P, C, o, k, t, x, y, z) - radius
+        depth = min(distance(P, C, o, k, began, bx, by, bz) - radius, 0.0)
         if gap < depth - ROUND * (1 + size3(x, y, z)):
             x, y, z = bx, by, bz
             vx, vy, vz = ground_of(P, k, t)

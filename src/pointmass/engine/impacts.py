@@ -38,7 +38,7 @@ class Impacts:
 
     def _prepare(self) -> str:
         state = self._state("x", "v")
-        close = f"near(F, t, {', '.join(state.split(', ')[:3])}, radius)"
+        close = f"near(F, K, o, t, {', '.join(state.split(', ')[:3])}, radius)"
         slope = ", ".join(f"np.float64(av[j + {k}])" for k in range(3))
         keep = [f"v[j + {k}] = R(v{a})" for k, a in enumerate(XYZ)] if self.order == 2 else []
         lines = [
@@ -73,7 +73,7 @@ class Impacts:
             *self.row,
             f"if {self.w} != 0:",
             f"    {now} = settle(F, K, o, end, h, {self._state('x', 'v')}, radius)",
-            *[f"    {now}, struck = bounce(F, end, {now}, radius)"] * self.contact.discrete,
+            *[f"    {now}, struck = bounce(F, K, o, end, {now}, radius)"] * self.contact.discrete,
             *indented(planned, 1),
             f"    {now}, clock, e, gx, gy, gz = strike(",
             f"        F, K, o, alone, events[i], {self._state('x0', 'v0')}, {now}, t, h, radius",
@@ -93,7 +93,7 @@ class Impacts:
         out = [
             *self.row,
             f"if {self.w} != 0:",
-            f"    {now} = evict(F, now, {self._state('x', 'v')}, radius, "
+            f"    {now} = evict(F, K, o, now, {self._state('x', 'v')}, radius, "
             + ", ".join(f"np.float64(bx[j + {k}])" for k in range(3))
             + ", began)",
             *indented(kept, 1),

@@ -317,6 +317,9 @@ class SinglesKernel:
             for q in "xv"[: self.system.order]
             for k in range(3)
         ]
+        if self.remembers:  # each lane has its own contacts: from one step to the next it is near the same triangles
+            record = island.deriv.contact.record  # type: ignore[union-attr]
+            call = call.replace(", K, ", f", K[{record} * i:{record} * (i + 1)], ")
         begin = ["clock = max(clock, birth[lo + i])"] if self.births else []
         mortal = island.deadly
         alive = " and died[lo + i] == 0" if mortal else ""
@@ -407,6 +410,12 @@ class SinglesKernel:
         return self.island is not None and self.island.watched
 
     @property
+    def remembers(self) -> bool:
+        """Whether a lane keeps what it looked up in the data of a surface."""
+        contact = None if self.island is None else self.island.deriv.contact
+        return contact is not None and contact.looks_up
+
+    @property
     def shared(self) -> list[str]:
         """Arrays that the lanes read: the scratch holds the columns."""
         more = ["F"] if self.system.colliders else []
@@ -471,7 +480,7 @@ class SingleMembers:
         died, hit = np.zeros((2, count), np.uint8)
         marks = [*[died] * self.kernel.deadly, *[hit] * self.kernel.watched]
         arrays = (x, v, *kept, *data, *grid, status, reach, *marks)
-        spread(lambda lo, hi: kernel(lo, hi, *arrays, *scratch([1])), tiles, GRAIN)
+        spread(lambda lo, hi: kernel(lo, hi, *arrays, *scratch([W if self.kernel.remembers else 1])), tiles, GRAIN)
         work = Stats(span.count, 0, span.count * motion.evaluations)
         far = reach.max(axis=0).astype(np.float64)
         touched = self.rows[:0] if island is None else self.rows[island.marked(hit)]

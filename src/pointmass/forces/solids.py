@@ -32,6 +32,10 @@ class Solid(Protocol):
     def surfaces(self) -> Sequence[Any]:
         """Parts with a smooth distance."""
 
+    @property
+    def lookup(self) -> str:
+        """In what data the distance is looked up; "" where there are laws."""
+
 
 class Solids:
     """Colliders that a field is about.
@@ -48,7 +52,7 @@ class Solids:
     Raises
     ------
     InvalidInput
-        Something else.
+        Something else, or a collider without a formula.
     """
 
     def __init__(self, around: Any) -> None:
@@ -56,6 +60,11 @@ class Solids:
         for solid in solids:
             if not hasattr(solid, "distance_law"):
                 raise InvalidInput(f"around must be a list of colliders, such as [Sphere()], not {shown(around)}")
+            if solid.lookup:
+                raise InvalidInput(
+                    f"around holds a {solid.name}, but fields know surfaces that have a formula: use spheres, boxes, "
+                    "capsules or cylinders about as large"
+                )
         self.surfaces = [surface for solid in solids for surface in solid.surfaces]
         self.parameters: list[Parameter] = []
         for k, surface in enumerate(self.surfaces):

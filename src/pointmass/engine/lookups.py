@@ -1,0 +1,71 @@
+"""Prints the search in the data of surfaces that have any: for each kind of data, `NAME_look` and `NAME_bound`.
+
+`NAME_look(P, k, x, y, z, guess)` does what `look` of the surface does to one point: it returns the signed distance, the
+normal, and where in the data they are from: for the next point that is a guess, which costs time if it is wrong and
+changes nothing. `NAME_bound(P, k, x, y, z)` returns a lower bound of the distance, at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from pointmass.collisions import distance_grid, triangles, triangulated
+from pointmass.engine.printing import function, statements
+from pointmass.tracing.columns import expanded
+from pointmass.tracing.trace import Traced, vector_names
+
+MARK = "# --- printed from here on\n"
+
+
+def body_of(name: str) -> str:
+    """The part of a file of text that is printed."""
+    return Path(__file__).with_name(name).read_text(encoding="utf-8").split(MARK)[1].strip("\n") + "\n\n\n"
+
+
+def _triangles(shape: int) -> str:
+    """The text for meshes; `shape` is the column of a surface's row where the numbers of its shape begin."""
+    numbers = {name: shape + j for j, name in enumerate(triangulated.NUMBERS) if name}
+    numbers |= {"TRIANGLE": len(_entries("P")), "FEATURES": triangles.FEATURES}
+    constants = "".join(f"{name} = {value}\n" for name, value in numbers.items()) + f"SLACK = {triangles.SLACK!r}\n\n\n"
+    point = dict(zip(vector_names("p"), "xyz", strict=True))
+    entries = dict(list(_entries("P").items())[3:])
+    found = _law("triangle_of", "P, at, x, y, z", triangles.triangle(), point | entries)
+    own = {"half": "P[row + HALF]", "side": "P[row + SIDE]", "small": "P[row + SMALL]"}
+    looked = ["qx", "qy", "qz", "square", "feature", "nx", "ny", "nz"]
+    names = dict(zip([*vector_names("q"), "square", "feature", *vector_names("n")], looked, strict=True))
+    result = _law("outcome_of", f"P, row, {', '.join(looked)}", triangles.outcome(), names | own)
+    return constants + found + result + body_of("triangles_text.py")
+
+
+def _distances(shape: int) -> str:
+    """The text for grids of distances."""
+    numbers = {name: shape + j for j, name in enumerate(distance_grid.NUMBERS) if name}
+    constants = "".join(f"{name} = {value}\n" for name, value in numbers.items()) + "\n\n"
+    point = dict(zip(vector_names("p"), "xyz", strict=True))
+    own = {n: f"P[row + {name} + {j}]" for v, name in VECTORS.items() for j, n in enumerate(vector_names(v))}
+    found = _law("cell_of", "P, row, x, y, z", distance_grid.cell(), point | own)
+    part = dict(zip(vector_names("part"), "uvw", strict=True)) | {"side": "P[row + FREE]"}
+    part |= {f"d{i}{j}{k}": f"P[at + {i} * across + {j} * along + {k}]" for i, j, k in distance_grid.CORNERS}
+    arguments = "P, row, at, across, along, x, y, z, u, v, w"
+    return (
+        constants
+        + found
+        + _law("distance_of", arguments, distance_grid.distance(), point | own | part)
+        + body_of("distances_text.py")
+    )
+
+
+VECTORS = {"inverse": "INVERSE", "counts": "COUNTS", "extent": "REACH"}  # of a grid of distances
+TEXTS: Mapping[str, Callable[[int], str]] = {"triangles": _triangles, "distances": _distances}
+
+
+def _entries(array: str) -> dict[str, str]:
+    """The numbers of a triangle in the data, in their order: see `TriangleTree.numbers`."""
+    vectors = [n for v in ("corner", "e1", "e2", "n") for n in vector_names(v)]
+    return {n: f"{array}[at + {j}]" for j, n in enumerate([*vectors, "a", "b", "c", "inverse", "third"])}
+
+
+def _law(name: str, arguments: str, law: Traced, names: Mapping[str, str]) -> str:
+    lines, outputs = statements(expanded(law.program, inline=True), names, "r", "float64")
+    return function(name, arguments, "**FLAGS", [*lines, f"return {', '.join(outputs)}"])
