@@ -40,7 +40,7 @@ NEEDED: dict[str, dict[str, Any]] = {
     "points": {"x": [[0.0, 1.0, 0.0], [0.5, 1.2, 0.1]]},
     "scatter": {"count": 4},
     "polygon": {"vertices": SQUARE},
-    "distance_grid": {"distances": [[[-1.0, 1.0], [1.0, 1.0]], [[1.0, 1.0], [1.0, 1.0]]], "spacing": 1.0},
+    "distance_grid": {"distances": [[[-0.5, -0.5], [-0.5, -0.5]], [[0.5, 0.5], [0.5, 0.5]]], "spacing": 1.0},
     "height_field": {"heights": [[0.0, 0.1, 0.2], [0.1, 0.0, -0.1]]},
 }
 OTHER: dict[str, Any] = {  # another value than the default, by annotation

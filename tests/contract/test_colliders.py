@@ -45,7 +45,7 @@ EXAMPLES = {
     "distance_grid": [
         pm.DistanceGrid(PEAR, spacing=0.2),
         pm.DistanceGrid(PEAR[2:, :, 1:], spacing=(0.2, 0.25, 0.2), origin=(-1, -1, -1), shift=(0, "0.2*sin(2*t)", 0)),
-        pm.DistanceGrid(PEAR, spacing=0.4, inside=True),
+        pm.DistanceGrid(2 * PEAR, spacing=0.4, inside=True),
     ],
     "height_field": [
         pm.HeightField(HILLS, (4.4, 4.4), depth=0.5),

@@ -48,7 +48,7 @@ WORLDS["hills"] = lambda **k: [pm.HeightField(HILLS, (2.5, 2.5), **k), pm.Plane(
 PEBBLE = np.linalg.norm(np.indices((9, 9, 9)) - 4.0, axis=0) / 4 - 0.6
 WORLDS["pebbles"] = lambda **k: [
     pm.DistanceGrid(PEBBLE, spacing=0.25, shift=("0.1*sin(8*t)", 0, 0), **k),
-    pm.DistanceGrid(PEBBLE, spacing=0.8, inside=True, **k),
+    pm.DistanceGrid(3.2 * PEBBLE, spacing=0.8, inside=True, **k),
     pm.HeightField(HILLS, (2.5, 2.5), shift=(0, -1.4, 0), **k),
 ]
 WORLDS["everything"] = lambda **k: [c for name in ("room", "ball", "paddle", "plates") for c in WORLDS[name](**k)]

@@ -21,6 +21,7 @@ from pointmass.tracing.trace import Traced, trace
 
 DistanceSource = str | Path | ArrayLike
 NUMBERS = ("FREE", "ORIGIN", "", "", "INVERSE", "", "", "COUNTS", "", "", "REACH", "", "")  # of the shape
+SLOPES = (0.7, 1.4)  # of distances near the surface, at least and at most
 CORNERS = tuple(product((0, 1), repeat=3))  # of a cell, z running fastest
 
 
@@ -114,8 +115,8 @@ class DistanceGrid(LookedUp):
     Raises
     ------
     InvalidInput
-        Another shape, a distance that is not finite, distances that all have one sign, a file that is missing or
-        damaged.
+        Another shape, a distance that is not finite, distances that all have one sign or are none (their slope at the
+        surface is far from 1), a file that is missing or damaged.
 
     Examples
     --------
@@ -159,6 +160,7 @@ class DistanceGrid(LookedUp):
         self.spacing = finite_array("spacing", [spacing] * 3 if np.ndim(spacing) == 0 else spacing, (3,))
         if (self.spacing <= 0).any():
             raise InvalidInput(f"spacing = {spacing} is not allowed: it must be greater than 0 [m] on every axis")
+        _check_slope(self.values, self.spacing)
         self.extent = self.spacing * (np.array(self.values.shape) - 1)
         self.origin = -0.5 * self.extent if origin is None else finite_array("origin", origin, (3,))
         self.sign = -1.0 if inside else 1.0
@@ -222,6 +224,18 @@ def _steepest(values: NDArray[np.float64], spacing: NDArray[np.float64]) -> floa
             along = np.maximum(a, b)
         square = square + along**2
     return float(np.sqrt(square.max()))
+
+
+def _check_slope(values: NDArray[np.float64], spacing: NDArray[np.float64]) -> None:
+    """Refuse what are no distances: near the surface those change by 1 m for each metre."""
+    slopes = np.gradient(values, *spacing.tolist())
+    near = np.abs(values) <= spacing.max()
+    slope = float(np.median(np.sqrt(sum(s[near] ** 2 for s in slopes)))) if near.any() else np.inf
+    if not SLOPES[0] <= slope <= SLOPES[1]:
+        raise InvalidInput(
+            f"distances must change by about 1 m for each metre near the surface, not by {slope:.2g} m: give spacing "
+            "and distances in metres, and make other fields distances first"
+        )
 
 
 def _read(path: Path) -> Sequence[Any]:
