@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pointmass.collisions.collider import Array
 from pointmass.meshes import TriangleMesh
-from pointmass.tracing.functions import Number, Triple, dot, maximum, minimum, scale, sqrt, sub, where
+from pointmass.tracing.functions import Number, Triple, atan2, dot, maximum, minimum, scale, sqrt, sub, where
 from pointmass.tracing.program import Vector
 from pointmass.tracing.trace import Traced, trace
 
@@ -227,5 +227,5 @@ def _angles(corners: Array) -> Array:
     ahead = np.roll(corners, -1, axis=1) - corners
     behind = np.roll(corners, 1, axis=1) - corners
     across = np.linalg.norm(np.cross(ahead, behind), axis=2)
-    result: Array = np.arctan2(across, (ahead * behind).sum(axis=2))
+    result: Array = atan2(across, (ahead * behind).sum(axis=2))
     return result
