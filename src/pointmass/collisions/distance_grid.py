@@ -228,7 +228,8 @@ def _steepest(values: NDArray[np.float64], spacing: NDArray[np.float64]) -> floa
 
 def _check_slope(values: NDArray[np.float64], spacing: NDArray[np.float64]) -> None:
     """Refuse what are no distances: near the surface those change by 1 m for each metre."""
-    slopes = np.stack(np.gradient(values, *spacing.tolist()))
+    gradient: Any = np.gradient(values, *spacing.tolist())
+    slopes = np.stack(gradient)
     near = np.abs(values) <= spacing.max()
     slope = float(np.median(np.linalg.norm(slopes[:, near], axis=0))) if near.any() else np.inf
     if not SLOPES[0] <= slope <= SLOPES[1]:
