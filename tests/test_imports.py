@@ -30,6 +30,7 @@ SOURCES = Path(pm.__file__).parent
 TEXTS = (
     "engine/support.py",
     "engine/contact_text.py",
+    "engine/distances_text.py",
     "engine/triangles_text.py",
 )  # what kernels import, and kernels' texts
 
