@@ -68,9 +68,8 @@ class Dust(ShippedScene):
         """Sand lies along the way of the whirl; dust begins below it."""
         stiffest = (1 + UNEVEN) * self.drag / DUST
         substeps = max(2, math.ceil(stiffest / 60))  # a step is at most as long as the air needs to stop a grain
-        air = CurlNoise(1.5 * self.core, 2 * self.turbulence, rate=0.0, octaves=1, seed=5)
-        # Each of the two winds drags with a half of k, so each has twice its speed: the air is the sum of both.
-        k = f"{0.5 * self.drag!r}*({1 - UNEVEN!r} + {2 * UNEVEN!r}*chance)"
+        air = CurlNoise(1.5 * self.core, self.turbulence, rate=0.0, octaves=1, seed=5)
+        k = f"{self.drag!r}*({1 - UNEVEN!r} + {2 * UNEVEN!r}*chance)"
         ground = (abs(self.wind) * SECONDS + 10 * self.core, 0.0, 2 * self.wander + 8 * self.core)
         x, z = self.way
         return Scene(
@@ -94,7 +93,7 @@ class Dust(ShippedScene):
                     mass=DUST,
                 )
             ],
-            forces=[Gravity((0.0, -self.gravity, 0.0)), Wind(self._whirl(2.0), k), Wind(air, k)],
+            forces=[Gravity((0.0, -self.gravity, 0.0)), Wind([self._whirl(), air], k)],
             colliders=[Plane(restitution=0.1, friction=self.friction)],
             camera=Camera(
                 position=(0.0, 0.2 * self.height, 2.4 * self.height), target=(0.0, 0.46 * self.height, 0.0), fov=32.0
@@ -111,8 +110,8 @@ class Dust(ShippedScene):
             ),
         )
 
-    def _whirl(self, factor: float) -> Flow:
-        """The air: up in the core, inwards below, outwards above, and around, without divergence; times a factor.
+    def _whirl(self) -> Flow:
+        """The air: up in the core, inwards below, outwards above, and around, without divergence.
 
         With q = r^2 / R^2 and R the radius, which grows upwards, its stream function is Q (1 - exp(-q)) B, and
         B = (1 - (1 + s) exp(-s)) exp(-(y/H)^4), s = (y + a) / d: the air is at rest at y = -a and high above H, and
@@ -142,9 +141,9 @@ class Dust(ShippedScene):
                 "H": self.height,
                 "d": depth,
                 "a": ROUGH * depth,
-                "S": factor * self.swirl / PEAK,
-                "W": factor * self.updraft,
-                "U": factor * self.wind,
+                "S": self.swirl / PEAK,
+                "W": self.updraft,
+                "U": self.wind,
             },
         )
 
