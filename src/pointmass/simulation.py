@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pointmass.deaths import Deaths
 from pointmass.emitters.emitter import Birth, Emitter
 from pointmass.engine.engine import Engine, compiled_by_default
 from pointmass.engine.island import Span
@@ -122,8 +123,8 @@ class Simulation:
         self._stage = Stage(self.look, system.particles.x)
         self._looks = self.t0, 0, 1.0  # time of a frame, how many were looked at from it on, and how many in a second
         p = system.particles
-        mortal = np.isfinite(p.lifetime)
-        self._mortal, self._death = p.id[mortal], self.t0 + (p.lifetime - p.age)[mortal]  # who dies, and when [s]
+        self._deaths = Deaths()
+        self._deaths.add(p.id, self.t0 + (p.lifetime - p.age))
         self._speed_limit = RUNAWAY * self._natural_speed()
 
     @property
@@ -239,7 +240,7 @@ class Simulation:
         if not self.engine.compiled:
             self._step()
             return
-        changes = self.emitters or len(self._mortal) or self.engine.deadly
+        changes = self.emitters or self._deaths or self.engine.deadly
         parents_killed = self.engine.deadly and self._lineage.followed
         single = (changes and self.engine.coupled) or parents_killed or self.zones or self.max_particles is not None
         span = Span(self.t0, self.dt, self.steps, 1 if single else min(most, self.engine.longest()))
@@ -251,7 +252,7 @@ class Simulation:
         old = len(self.system.particles)
         clock = self._bear(born, span.start)
         if self.engine.run(span, self._started(clock, span.start), look_inside) and self._slow_enough():
-            self._age(span, clock)
+            self._age(span, clock, old)
             self.steps += span.count
             self._bury(born, span.end)
             return
@@ -287,7 +288,7 @@ class Simulation:
             self.system.set_state(before, span.start)
             self.system.remove(np.arange(old, len(self.system.particles)))
             raise
-        self._age(span, clock)
+        self._age(span, clock, old)
         self.steps += 1
         self._bury(born, span.end)
 
@@ -330,30 +331,32 @@ class Simulation:
         p.x[early] -= (p.v[early] * (clock[early] - t0)[:, None]).astype(p.dtype)
         return np.where(early, t0, clock)
 
-    def _age(self, span: Span, clock: Array | None) -> None:
+    def _age(self, span: Span, clock: Array | None, old: int) -> None:
+        """Let all grow older by a span; those beyond the first `old` were born in it, each at its clock."""
         age = self.system.particles.age
-        if clock is None and len(age) * span.count > MANY_AGED:
-            grow_old(age, np.array([span.time(k + 1) - span.time(k) for k in range(span.count)]).astype(age.dtype))
-            return
-        for k in range(span.count):
-            t0, t1 = span.time(k), span.time(k + 1)
-            age += np.asarray(t1 - (t0 if clock is None else np.clip(clock, t0, t1)), age.dtype)
+        steps = [(span.time(k), span.time(k + 1)) for k in range(span.count)]
+        if old * span.count > MANY_AGED:
+            grow_old(age[:old], np.array([t1 - t0 for t0, t1 in steps]).astype(age.dtype))
+        else:
+            for t0, t1 in steps:
+                age[:old] += np.asarray(t1 - t0, age.dtype)
+        if clock is not None:
+            for t0, t1 in steps:
+                age[old:] += np.asarray(t1 - np.clip(clock[old:], t0, t1), age.dtype)
 
     def _bury(self, born: Born, t1: float) -> None:
         """Take away those whose time has come by t1, whom a surface killed, who are in a zone, and who are too many."""
-        new = [(k, birth) for births in born for k, birth in enumerate(births) if np.isfinite(birth.lifetime).any()]
+        new = [(k, birth) for births in born for k, birth in enumerate(births) if len(birth.number)]
         if new:
-            self._mortal = np.concatenate([self._mortal, *(birth.ids(k) for k, birth in new)])
-            self._death = np.concatenate([self._death, *(birth.death for _, birth in new)])
+            self._deaths.add(*(np.concatenate(a) for a in zip(*((b.ids(k), b.death) for k, b in new), strict=True)))
         self._lineage.settle(born, t1)
-        p, dead = self.system.particles, self._death <= t1
-        rows = p.rows(np.append(self._mortal[dead], self._lineage.taken))
+        p = self.system.particles
+        rows = p.rows(np.append(self._deaths.due(t1), self._lineage.taken))
         gone = killed(self.zones, p.x, t1, p.age > 0)
         gone[self.engine.died] = True
         spared = p.rows(self._lineage.spared)
         gone[spared[spared >= 0]] = False
         gone[rows[rows >= 0]] = True
-        self._mortal, self._death = self._mortal[~dead], self._death[~dead]
         if gone.any():
             self.system.remove(gone)
         if self.max_particles is not None and len(p) > self.max_particles:

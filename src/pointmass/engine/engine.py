@@ -48,6 +48,7 @@ MANY = 2000  # particles whose pairs take long in NumPy
 LARGE_IN_PAIRS = 512  # the same, where pairs of them act
 WORK = 1e9  # particle-steps between two returns to Python: so long Ctrl-C waits
 LONGEST = 256  # steps of a span
+ROOM = 16  # of that part of the present particles are births expected, when room is made
 
 
 class Members(Protocol):
@@ -95,6 +96,7 @@ class Engine:
     impacts: Impacts = NO_IMPACTS
     _hit: Rows = field(default_factory=lambda: np.zeros(0, np.intp))  # who has hit a surface in the last span
     _before: tuple[Array, Array] | None = None
+    _space: Array = field(default_factory=lambda: np.empty((2, 0, 3)))  # that `_before` is in
     _looked: bool = False  # whether the last step can no longer be looked into
     _last: Any = None  # span, births and ids, and what the reference path knew before it
     _kernels: tuple[Any, dict[Any, Any]] = (None, {})
@@ -209,7 +211,7 @@ class Engine:
         self.died = self.died[:0]
         self._last = span, births, p.id, self.reference.left()
         before = self._room()
-        groups = self._grouped(None, span.start) if births is None and not look_inside else []
+        groups = [] if look_inside else self._grouped(births, span.start)
         kernels = [g.members for g in groups if g.rows is None]
         if len(kernels) == 1 and isinstance(kernels[0], SingleMembers):
             kernels[0].before = before  # in one go with the steps
@@ -219,7 +221,7 @@ class Engine:
         if look_inside and span.count > 1:
             whole = self._launch(replace(span, count=span.count - 1), births)
             return whole and self._seen(replace(span, first=span.first + span.count - 1, count=1), births)
-        return self._seen(span, births) if look_inside else self._launch(span, births)
+        return self._seen(span, births) if look_inside else self._launch(span, births, groups)
 
     def _seen(self, span: Span, births: Array | None) -> bool:
         """Make one step, and make it again on the reference path for all that a look inside it asks for."""
@@ -265,8 +267,10 @@ class Engine:
     def _room(self) -> tuple[Array, Array]:
         """Room for the positions and velocities before a span."""
         p = self.system.particles
-        if self._before is None or self._before[0].shape != p.x.shape:
-            self._before = np.empty_like(p.x), np.empty_like(p.v)
+        n = len(p)
+        if self._space.shape[1] < n or self._space.dtype != p.dtype:
+            self._space = np.empty((2, n + n // ROOM, 3), p.dtype)  # so that births seldom need more
+        self._before = self._space[0, :n], self._space[1, :n]
         return self._before
 
     def _keep(self) -> None:
@@ -409,6 +413,8 @@ class Engine:
     def _made_groups(self, islands: Rows, births: bool) -> list[Group]:
         """Particles by the layout of their islands: lanes where there are many alike, rows of a grid, all threads on
         one that is large."""
+        if _by_lanes(self.solver) and int(islands.max()) + 1 == len(islands):
+            return [self._made(SinglesKernel, np.arange(len(islands)), islands, births)]
         size = np.bincount(islands)[islands]
         alone = (size == 1) & _by_lanes(self.solver)
         groups = [self._made(SinglesKernel, np.flatnonzero(alone), islands, births)] if alone.any() else []
