@@ -414,7 +414,8 @@ class Engine:
         """Particles by the layout of their islands: lanes where there are many alike, rows of a grid, all threads on
         one that is large."""
         if _by_lanes(self.solver) and int(islands.max()) + 1 == len(islands):
-            return [self._made(SinglesKernel, np.arange(len(islands)), islands, births)]
+            # Islands are numbered by their first particle, so all of them are the rows themselves.
+            return [Group(None, self._kernel(SinglesKernel, births).members(islands, islands))]
         size = np.bincount(islands)[islands]
         alone = (size == 1) & _by_lanes(self.solver)
         groups = [self._made(SinglesKernel, np.flatnonzero(alone), islands, births)] if alone.any() else []
