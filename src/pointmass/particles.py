@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from keyword import iskeyword
 from typing import Any, overload
 
@@ -17,6 +18,7 @@ Selection = str | slice | ArrayLike | None  # a group's name, a mask, rows; None
 FIRST_FOREIGN_ID = 2**40  # ids from here on are made by emitters, and leave no mark on the count
 NOT_ATTRIBUTES = ("t", "y", "z", "vx", "vy", "vz", "e", "pi", "dtype", "self")  # these mean something else
 FIELDS = ("x", "v", "f", "m", "w", "age", "lifetime", "radius", "chance", "id", "pinned")
+SPARE = 16  # room for a 16th more particles, so that births seldom move those who are there
 PLAIN = ("m", "radius", "age", "lifetime")  # columns of one number that all particles have
 BUILT_IN = (*PLAIN, "chance")  # and the one that follows from their ids
 
@@ -146,6 +148,7 @@ class Particles:
         self.version = 0
         self._next_id = 0
         self._chance = -1, np.zeros(0)
+        self._rooms: dict[str, tuple[NDArray[Any], int]] = {}  # memory of the columns, and up to where it is taken
         self._arrays = {name: np.zeros((0, 3), self.dtype) for name in "xvf"}
         self._arrays |= {name: np.zeros(0, self.dtype) for name in PLAIN}
         self._held = np.zeros(0, bool)
@@ -213,12 +216,13 @@ class Particles:
         new, columns = ({name: self._cast(name, part) for name, part in d.items()} for d in (new, columns))
         self._next_id = max(self._next_id, int(ids[ids < FIRST_FOREIGN_ID].max(initial=-1)) + 1)
         for name, values in new.items():
-            self._arrays[name] = np.concatenate([self._arrays[name], values])
+            self._arrays[name] = self._longer(name, self._arrays[name], values)
         for name, values in columns.items():
-            self.attributes[name] = np.concatenate([self.attributes[name], values])
+            self.attributes[name] = self._longer(name, self.attributes[name], values)
         for name, mask in self.groups.items():
             self.groups[name] = np.concatenate([mask, np.zeros(n, bool)])
-        self.id, self._held = np.concatenate([self.id, ids]), np.concatenate([self._held, np.zeros(n, bool)])
+        self.id = self._longer("id", self.id, ids)
+        self._held = self._longer("pinned", self._held, np.zeros(n, bool))
         self.version += 1
         return ids
 
@@ -237,11 +241,16 @@ class Particles:
 
     def keep(self, mask: NDArray[np.bool_]) -> None:
         """Keep the particles of a mask, in order."""
-        self._arrays = {name: _some(values, mask) for name, values in self._arrays.items()}
-        self.id, self._held = self.id[mask], self._held[mask]
-        self.attributes = {name: values[mask] for name, values in self.attributes.items()}
-        self.groups = {name: values[mask] for name, values in self.groups.items()}
-        self.version += 1
+        first = int(mask.argmax()) if len(mask) else 0
+        youngest = bool(mask[first:].all())  # the oldest die, the usual case: nothing needs to move
+        self._take((lambda values: values[first:]) if youngest else lambda values: _some(values, mask))
+
+    def part(self, mask: NDArray[np.bool_]) -> Particles:
+        """A copy of the particles of a mask, in order; these stay as they are."""
+        result = copy(self)
+        result._rooms = {}
+        result._take(lambda values: _some(values, mask))
+        return result
 
     def select(self, which: Selection) -> NDArray[np.intp]:
         """Rows of a selection, ascending.
@@ -332,6 +341,26 @@ class Particles:
             raise InvalidInput(f"id must be {n} whole numbers that no other particle has")
         return result
 
+    def _take(self, some: Callable[[Array], Array]) -> None:
+        """Replace every column by some of its rows."""
+        self._arrays = {name: some(values) for name, values in self._arrays.items()}
+        self.id, self._held = some(self.id), some(self._held)
+        self.attributes = {name: some(values) for name, values in self.attributes.items()}
+        self.groups = {name: some(values) for name, values in self.groups.items()}
+        self.version += 1
+
+    def _longer(self, name: str, column: NDArray[Any], values: NDArray[Any]) -> NDArray[Any]:
+        """A column with more rows, written into the room behind it if there is some left that nobody has written to."""
+        room, end = self._rooms.get(name, (None, 0))
+        more = end + len(values)
+        if room is None or column.base is not room or _end(column) != _end(room[:end]) or more > len(room):
+            end, more = len(column), len(column) + len(values)
+            room = np.empty((more + more // SPARE, *column.shape[1:]), column.dtype)
+            room[:end] = column
+        room[end:more] = values
+        self._rooms[name] = room, more
+        return room[end - len(column) : more]
+
     def _cast(self, name: str, values: Array) -> Array:
         with np.errstate(over="ignore"):
             result = values.astype(self.dtype)
@@ -346,6 +375,11 @@ def _some(values: Array, mask: NDArray[np.bool_]) -> Array:
         return values[mask]
     row = np.dtype((np.void, values.shape[1] * values.itemsize))
     return values.view(row)[:, 0][mask].view(values.dtype).reshape(-1, values.shape[1])
+
+
+def _end(values: NDArray[Any]) -> int:
+    """Where in memory an array ends."""
+    return int(values.__array_interface__["data"][0]) + values.nbytes
 
 
 def _read_only(array: NDArray[Any]) -> NDArray[Any]:

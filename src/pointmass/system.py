@@ -288,11 +288,10 @@ class ParticleSystem:
         mask = np.zeros(len(self.particles), bool)
         mask[rows] = True
         result = copy(self)
-        result.particles, result.forces = copy(self.particles), [force.twin() for force in self.forces]
+        result.particles, result.forces = self.particles.part(mask), [force.twin() for force in self.forces]
         result.filter = result._islands = None
         for force in result.forces:
             force.keep(self.particles, mask)
-        result.particles.keep(mask)
         return result
 
     # ---------------------------------------------------------------------------------------- inside
