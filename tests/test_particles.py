@@ -260,3 +260,48 @@ def test_inverse_masses_and_pins_are_only_read():
         p.w[0] = 0
     with pytest.raises(ValueError, match="read-only"):
         p.pinned[0] = True
+
+
+def test_births_and_deaths_by_turns_leave_every_column_right():
+    rng = np.random.default_rng(0)
+    p, x, heat, ids = Particles(X, heat=[1, 2, 3, 4]), X, np.array([1.0, 2, 3, 4]), np.arange(4)
+    p.pin([2])
+    held = np.arange(4) == 2
+    for k in range(60):
+        more = rng.random((rng.integers(0, 4), 3))
+        new = p.add(more, heat=float(k))
+        x, heat = np.concatenate([x, more]), np.concatenate([heat, np.full(len(more), float(k))])
+        ids, held = np.concatenate([ids, new]), np.concatenate([held, np.zeros(len(more), bool)])
+        mask = rng.random(len(x)) < 0.9 if k % 3 == 0 else np.arange(len(x)) >= k % 2
+        p.keep(mask)
+        x, heat, ids, held = x[mask], heat[mask], ids[mask], held[mask]
+        np.testing.assert_array_equal(p.x, x)
+        np.testing.assert_array_equal(p.column("heat"), heat)
+        np.testing.assert_array_equal(p.id, ids)
+        np.testing.assert_array_equal(p.pinned, held)
+    p.keep(np.zeros(len(p), bool))
+    p.keep(np.zeros(0, bool))
+    assert p.x.shape == (0, 3)
+
+
+def test_parts_are_copies():
+    p = Particles(np.zeros((40, 3)))
+    p.add(np.zeros((2, 3)))  # with room behind
+    part = p.part(np.ones(42, bool))
+    p.add([[1, 1, 1]])
+    part.add([[2, 2, 2]])
+    assert (p.x[42, 0], part.x[42, 0]) == (1, 2)
+    part.x[0] = 7
+    assert p.x[0, 0] == 0
+    p.keep(np.arange(43) > 0)
+    again = p.part(np.ones(42, bool))
+    again.x[:] = 5
+    assert p.x.max() == 1
+
+
+def test_rows_of_ids_in_any_order():
+    p = Particles(np.zeros((6, 3)), dtype=np.float32)
+    p.add(np.zeros((3, 3)), id=[2**41 + 5, 2**41 + 1, 2**42])
+    p.remove([1, 4])
+    assert p.rows([[2**42, 5], [1, 2**41 + 1], [-3, 0], [9, 2**60]]).tolist() == [[6, 3], [-1, 5], [-1, 0], [-1, -1]]
+    assert p.rows([]).tolist() == []

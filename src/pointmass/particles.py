@@ -341,7 +341,7 @@ class Particles:
             raise InvalidInput(f"id must be {n} whole numbers that no other particle has")
         return result
 
-    def _take(self, some: Callable[[Array], Array]) -> None:
+    def _take(self, some: Callable[[NDArray[Any]], NDArray[Any]]) -> None:
         """Replace every column by some of its rows."""
         self._arrays = {name: some(values) for name, values in self._arrays.items()}
         self.id, self._held = some(self.id), some(self._held)
@@ -369,7 +369,7 @@ class Particles:
         return result
 
 
-def _some(values: Array, mask: NDArray[np.bool_]) -> Array:
+def _some(values: NDArray[Any], mask: NDArray[np.bool_]) -> NDArray[Any]:
     """Rows of a mask; a row of three numbers is moved as one item, ten times as fast as number by number."""
     if values.ndim == 1:
         return values[mask]

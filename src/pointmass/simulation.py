@@ -311,12 +311,14 @@ class Simulation:
         new = [(k, birth) for births in born for k, birth in enumerate(births) if len(birth.number)]
         if not new:
             return None
-        clock = [np.full(len(self.system.particles), t0), *(np.maximum(birth.time, t0) for _, birth in new)]
+        old = len(self.system.particles)
         names = dict.fromkeys(name for _, birth in new for name in birth.columns)
         columns = {name: np.concatenate([birth.column(name) for _, birth in new]) for name in names}
         x, v, lifetime = (np.concatenate([getattr(b, name) for _, b in new]) for name in ("x", "v", "lifetime"))
         self.system.add(x, v, lifetime=lifetime, id=np.concatenate([birth.ids(k) for k, birth in new]), **columns)
-        return np.concatenate(clock)
+        clock = np.full(len(self.system.particles), t0)
+        clock[old:] = np.maximum(np.concatenate([birth.time for _, birth in new]), t0)
+        return clock
 
     def _started(self, clock: Array | None, t0: float) -> Array | None:
         """The clock at which each particle begins to move; None if all do at t0.

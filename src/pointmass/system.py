@@ -84,6 +84,7 @@ class ParticleSystem:
         self.filter: Filter | None = None
         self.t = 0.0
         self._islands: tuple[Any, NDArray[np.intp]] | None = None
+        self._numbers = np.arange(0)  # 0, 1, 2, ...: the islands where nobody is linked
         for force in self.forces:
             if not isinstance(force, Force):
                 raise InvalidInput(f"forces must be forces, such as pm.Gravity(), not {force!r}")
@@ -322,7 +323,9 @@ class ParticleSystem:
         n = len(self.particles)
         links = _stack([f.links(self.particles) for f in self.forces if f.enabled])
         if not len(links):
-            return np.arange(n)
+            if len(self._numbers) < n:
+                self._numbers = np.arange(2 * n)
+            return self._numbers[:n]
         graph = coo_array((np.ones(len(links), np.int8), (links[:, 0], links[:, 1])), shape=(n, n))
         _, label = connected_components(graph, directed=False)
         _, first, inverse = np.unique(label, return_index=True, return_inverse=True)

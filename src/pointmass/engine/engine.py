@@ -184,7 +184,7 @@ class Engine:
         """
         p, memory = self.system.particles, self.reference.recall()
         nothing = Span(self.system.t, 1.0, 0, 0)
-        for group in self._grouped(None, nothing.start) if self.compiled else []:
+        for group in self._grouped(None) if self.compiled else []:
             x, v = (_taken(array, group.rows).copy() for array in (p.x, p.v))
             group.members.run(x, v, None, nothing, memory)
 
@@ -192,7 +192,7 @@ class Engine:
     def coupled(self) -> bool:
         """Whether particles act on each other, or will once there are some: births and deaths then end a span."""
         islands = self.system.island_of_particle
-        return self._pairs or (len(islands) > 0 and int(islands.max()) + 1 < len(islands))
+        return self._pairs or (len(islands) > 0 and not _apart(islands))
 
     @property
     def deadly(self) -> bool:
@@ -211,7 +211,7 @@ class Engine:
         self.died = self.died[:0]
         self._last = span, births, p.id, self.reference.left()
         before = self._room()
-        groups = [] if look_inside else self._grouped(births, span.start)
+        groups = [] if look_inside else self._grouped(births)
         kernels = [g.members for g in groups if g.rows is None]
         if len(kernels) == 1 and isinstance(kernels[0], SingleMembers):
             kernels[0].before = before  # in one go with the steps
@@ -242,7 +242,7 @@ class Engine:
         p = self.system.particles
         memory = self.reference.recall()
         outcomes = []
-        for group in self._grouped(births, span.start) if groups is None else groups:
+        for group in self._grouped(births) if groups is None else groups:
             x, v = _taken(p.x, group.rows), _taken(p.v, group.rows)
             clock = births if births is None or group.rows is None else births[group.rows]
             outcome = group.members.run(x, v, clock, span, memory)
@@ -333,7 +333,7 @@ class Engine:
             kind, how = (SinglesKernel, True) if _by_lanes(self.solver) else (IslandKernel, False)
             groups = [self._made(kind, rows, self.system.island_of_particle, how)]
         else:
-            groups = self._grouped(births, step.start)
+            groups = self._grouped(births)
         self._keep()
         left = self.reference.left()
         if not self._launch(step, births, groups):
@@ -401,20 +401,18 @@ class Engine:
 
     # ------------------------------------------------------------------------------------------------ groups
 
-    def _grouped(self, births: Array | None, start: float) -> list[Group]:
+    def _grouped(self, births: Array | None) -> list[Group]:
         system = self.system
         islands = system.island_of_particle
-        newborn = None if births is None else births > start
-        key = (system.particles.version, self._kinds(), newborn is None)
-        if self._structure is not islands or self._groups[0] != key or newborn is not None:
-            self._structure, self._groups = islands, (key, self._made_groups(islands, newborn is not None))
+        key = (system.particles.version, self._kinds(), births is None)
+        if self._structure is not islands or self._groups[0] != key or births is not None:
+            self._structure, self._groups = islands, (key, self._made_groups(islands, births is not None))
         return self._groups[1]
 
     def _made_groups(self, islands: Rows, births: bool) -> list[Group]:
         """Particles by the layout of their islands: lanes where there are many alike, rows of a grid, all threads on
         one that is large."""
-        if _by_lanes(self.solver) and int(islands.max()) + 1 == len(islands):
-            # Islands are numbered by their first particle, so all of them are the rows themselves.
+        if _by_lanes(self.solver) and _apart(islands):
             return [Group(None, self._kernel(SinglesKernel, births).members(islands, islands))]
         size = np.bincount(islands)[islands]
         alone = (size == 1) & _by_lanes(self.solver)
@@ -504,6 +502,11 @@ def _copied(target: Array, source: Array) -> None:
         target[lo:hi] = source[lo:hi]
 
     spread(copy, len(source), GRAIN)
+
+
+def _apart(islands: Rows) -> bool:
+    """Whether all particles are islands of their own, whose numbers are then the rows: first particles count them."""
+    return int(islands[-1]) + 1 == len(islands)
 
 
 def _has_step(solver: Solver) -> bool:

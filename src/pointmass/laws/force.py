@@ -198,10 +198,11 @@ class Force(Described, ABC):
         InvalidInput
             A particle, attribute or group that does not exist, a column of another length.
         """
-        rows = particles.select(self.on)
-        if self.on is not None and not isinstance(self.on, str):
-            self.on = np.zeros(len(particles), bool)
-            self.on[rows] = True
+        if self.on is not None:
+            rows = particles.select(self.on)
+            if not isinstance(self.on, str):
+                self.on = np.zeros(len(particles), bool)
+                self.on[rows] = True
         self._bound = particles
 
     @abstractmethod

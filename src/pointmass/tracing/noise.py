@@ -244,7 +244,9 @@ def _number(shift: int, bits: int) -> Whole:
 
 
 WHOLE = Whole(lambda a: a.astype(np.int32).astype(np.uint32), "np.uint32(np.int32({0}))")
-AFTER = Whole(lambda i: (i + np.uint32(1)) & np.uint32(0xFFFFFF), "np.uint32(({0} + np.uint32(1)) & np.uint32(0xFFFFFF))")
+AFTER = Whole(
+    lambda i: (i + np.uint32(1)) & np.uint32(0xFFFFFF), "np.uint32(({0} + np.uint32(1)) & np.uint32(0xFFFFFF))"
+)
 SUM = Whole(lambda a, b: np.uint32(np.uint64(a) + b), "np.uint32(np.uint64({0}) + {1})")
 MIXED = Whole(mixed, "mixed({0})")
 
