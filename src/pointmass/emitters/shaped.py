@@ -186,7 +186,7 @@ class ShapedEmitter(Emitter):
         """Draws for births of some ids, where surfaces have these normals."""
         place, own = self.places(seed, stream, ids)
         normal = own if normals is None else normals
-        axis = normal if self._axis is None else np.broadcast_to(self._axis, place.shape)
+        axis = normal if self._axis is None else np.atleast_2d(self._axis)  # one for all needs one frame
         way = _within_cone(axis, self._edge, random.uniform(seed, stream, ids, "direction"))
         speed = self._speed.draw(seed, stream, ids)
         columns = {name: quantity.draw(seed, stream, ids) for name, quantity in self._columns.items()}
