@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,6 +16,7 @@ from pointmass.engine import store
 from pointmass.engine.contact import ContactText
 from pointmass.engine.reference import KILLED, ReferenceEngine, surfaces_of
 from pointmass.solvers import SOLVERS
+from tests import naive
 
 PLATE = [[-1, 0.3, -1], [-1, 0.3, 1], [0.4, 0, 1], [0.4, 0, -1]]
 WORLDS = {
@@ -327,3 +329,55 @@ def test_linked_particles_in_a_room_some_of_them_pinned(solver, monkeypatch):
     tolerance = 1e-7 if solver in ("implicit_euler", "dopri5") else 1e-11
     np.testing.assert_allclose(fast.x, slow.x, rtol=0, atol=tolerance)
     np.testing.assert_allclose(fast.v, slow.v, rtol=0, atol=100 * tolerance)
+
+
+# ------------------------------------------------------------------------------------------------ memory of searches
+
+
+RING = trimesh.creation.torus(1.0, 0.35, major_sections=11, minor_sections=7)
+GLOBE = trimesh.creation.uv_sphere(0.8, count=[6, 24])  # more triangles meet at a pole than a search remembers
+SEARCHED = {
+    "ring": pm.Mesh((RING.vertices, RING.faces)),
+    "globe": pm.Mesh((GLOBE.vertices, GLOBE.faces), inside=True),
+    "sheet": pm.Mesh(SHEET, thickness=0.1),
+    "hills": pm.HeightField(HILLS, (2.5, 2.5)),
+}
+
+
+def walk(shape, rng, stride, count):
+    """Places one after the other, from a corner of a mesh on."""
+    steps = rng.normal(size=(count, 3)) * stride
+    return shape.triangles.vertices[rng.integers(len(shape.triangles.vertices))] + np.cumsum(steps, axis=0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.sampled_from(sorted(SEARCHED)), st.integers(0, 10**6), st.sampled_from([1e-12, 1e-5, 1e-3, 0.02, 0.3]))
+def test_what_a_search_remembers_changes_no_bit(name, seed, stride):
+    shape, rng = SEARCHED[name], np.random.default_rng(seed)
+    text = ContactText([shape], 2, False, "float64")
+    do, table, memory = printed(text.text), text.table(), np.zeros(text.record)
+    x = walk(shape, rng, stride, 25)
+    gaps, normals = shape.look(x)
+    mesh = shape.triangles
+    away = naive.distance_to_triangles(x[-1].tolist(), mesh.vertices.tolist(), mesh.faces.tolist())
+    assert abs(gaps[-1] + shape.half) == pytest.approx(away, abs=1e-12)
+    for place, gap, normal in zip(x, gaps, normals, strict=True):
+        for way in (gap, gap - stride, gap - 10 * stride):
+            assert not do["far_from"](table, memory, 0, 0, *place, way) or gap > way
+        assert do["gap_of"](table, memory, 0, 0, *place) == gap
+        np.testing.assert_array_equal(do["normal_of"](table, memory, 0, 0, *place), normal)
+
+
+def test_who_hardly_moves_searches_once(monkeypatch):
+    shape = SEARCHED["ring"]
+    text = ContactText([shape], 2, False, "float64")
+    do, table, memory = printed(text.text), text.table(), np.zeros(text.record)
+    searches, search = [], do["triangles_search"]
+    monkeypatch.setitem(do, "triangles_search", lambda *given: searches.append(given) or search(*given))
+    x = walk(shape, np.random.default_rng(1), 1e-4, 50)
+    for place in x:
+        do["gap_of"](table, memory, 0, 0, *place)
+    assert len(searches) == 1
+    assert not do["far_from"](table, memory, 0, 0, 5.0, 0.0, 0.0, 1.0)  # it is, but not by where it looked last
+    do["gap_of"](table, memory, 0, 0, 5.0, 0.0, 0.0)
+    assert do["far_from"](table, memory, 0, 0, 5.1, 0.0, 0.0, 3.0)

@@ -41,7 +41,7 @@ from numpy.typing import NDArray
 from pointmass.collisions import contact, swept
 from pointmass.collisions.collider import Collider, Response
 from pointmass.collisions.looked_up import LookedUp
-from pointmass.engine.lookups import TEXTS, body_of
+from pointmass.engine.lookups import LOOKUPS, body_of
 from pointmass.engine.printing import indented, literal, statements
 from pointmass.engine.reference import EVICTIONS, KILLED, MOST_EVENTS
 from pointmass.laws.parameter import Component, Parameter
@@ -57,8 +57,9 @@ RECORD = {  # of a contact, with the size of each
     **{"ON": 1, "LEVEL": 1, "START": 3, "SLIDE": 3, "SPEED": 1, "LOAD": 1, "GIVEN": 3, "NORMAL": 3},
     **{"PRESSED": 1, "HELD": 1, "STICKS": 1, "CARRIED": 3, "BEND": 1},
 }
-REMEMBERED = 9  # numbers: whether there is a point, its place, distance and normal, and where in the data they are from
+REMEMBERED = 8  # numbers: whether there is a point, its place, distance and normal; what a search remembers is behind
 RESPONSES = get_args(Response)
+WIDE = 1.000001  # times a way: more than the roundings of ways
 ROUNDING = {"float64": 1e-13, "float32": 1e-6}  # of the places between which `clear` looks, on top of eps
 PATH = [f"{p}{end}" for end in "01" for p in ("x", "y", "z", "u", "v", "w")]
 
@@ -86,7 +87,8 @@ class ContactText:
         self.surfaces, self._dtype = surfaces, dtype
         self._memory = 1 + sum(RECORD.values()) * len(surfaces)
         self.looks_up = any(s.lookup for s in surfaces)
-        self.record = self._memory + REMEMBERED * len(surfaces) * self.looks_up
+        self._remembered = max((REMEMBERED + LOOKUPS[s.lookup].memory for s in surfaces if s.lookup), default=0)
+        self.record = self._memory + self._remembered * len(surfaces)
         self._kinds = list(dict.fromkeys(s.lookup or s.laws for s in surfaces))
         self._row = TABLE.index("SHAPE") + max((len(s.shape) for s in surfaces), default=0)
         blocks = [s.data if isinstance(s, LookedUp) else np.zeros(0) for s in surfaces]
@@ -132,8 +134,13 @@ class ContactText:
         numbers |= {"MOST_EVENTS": MOST_EVENTS, "EVICTIONS": EVICTIONS, "SETTLED": contact.SETTLED}
         rounding = contact.STILL * float(np.finfo(self._dtype).eps)
         numbers |= {"ROUND": rounding, "CREEP": max(contact.CREEP, rounding)}
-        numbers |= {"MARGIN": swept.MARGIN, "MOST_LOOKS": swept.MOST_LOOKS, "SURFACES": len(self.surfaces)}
-        numbers |= {"ROW": self._row, "MEMORY": self._memory, "REMEMBERED": REMEMBERED}
+        numbers |= {
+            "MARGIN": swept.MARGIN,
+            "MOST_LOOKS": swept.MOST_LOOKS,
+            "WIDE": WIDE,
+            "SURFACES": len(self.surfaces),
+        }
+        numbers |= {"ROW": self._row, "MEMORY": self._memory, "REMEMBERED": self._remembered}
         flat = [_flat(s) for s in self.surfaces]
         numbers |= {"LOOKUPS": self.looks_up}
         numbers |= {"CHORDS": not all(f or s.lookup for f, s in zip(flat, self.surfaces, strict=True))}
@@ -170,13 +177,13 @@ class ContactText:
     def _lookups(self) -> list[str]:
         """The search in data, and `look_of`, which does that of a surface."""
         names = [(j, kind) for j, kind in enumerate(self._kinds) if isinstance(kind, str)]
-        texts = [TEXTS[kind](TABLE.index("SHAPE")) for _, kind in names]
-        *several, last = [[f"return {kind}_look(P, k, x, y, z, guess)"] for _, kind in names] or [[]]
+        texts = [LOOKUPS[kind].text(TABLE.index("SHAPE")) for _, kind in names]
+        *several, last = [[f"return {LOOKUPS[kind].call}"] for _, kind in names] or [[]]
         if not last:
             return []
         keyed = ["which = int(P[k * ROW + KIND])"] if several else []
         keyed += [line for (j, _), case in zip(names, several, strict=False) for line in _when(j, case)]
-        return [*texts, "@njit(**FLAGS)", "def look_of(P, k, x, y, z, guess):", *indented([*keyed, *last], 1), "", ""]
+        return [*texts, "@njit(**FLAGS)", "def look_of(P, C, m, k, x, y, z):", *indented([*keyed, *last], 1), "", ""]
 
     def _places(self) -> list[str]:
         """`place_of`, `ground_of` and `push_of`."""
@@ -280,13 +287,13 @@ class ContactText:
             more, (gap,) = statements(expanded(law.program), at | numbers, f"{tag}{j}_", dtype)
             lines.lane += more
             gaps.append(f"({gap} - far)")
-        wide = literal(1.000001, dtype)
+        wide = literal(WIDE, dtype)
         away = f"({gaps[0]} > {tag}near + {wide} * (way + {tag}way)) & ({gaps[1]} > {tag}near)"
         lines.lane.append(f"safe = safe & {away}")
 
     def _clear_by_bound(self, k: int, lookup: str, dtype: str, table: str, lines: ClearLines) -> None:
         """The start is farther away than the whole way by the bound that the surface's data give at once."""
-        tag, wide = f"q{k}_", literal(1.000001, dtype)
+        tag, wide = f"q{k}_", literal(WIDE, dtype)
         self._way(k, table, lines)
         place = ", ".join(f"np.float64({a}0 - {tag}{a}0)" for a in "xyz")
         lines.lane.append(f"{tag}gap = R({lookup}_bound({table}, {k}, {place})) - far")

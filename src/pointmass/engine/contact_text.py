@@ -44,8 +44,21 @@ def remembered(P, C, o, k, x, y, z):
     m = o + MEMORY + REMEMBERED * k
     if not (C[m] == 1.0 and C[m + 1] == x and C[m + 2] == y and C[m + 3] == z):
         C[m], C[m + 1], C[m + 2], C[m + 3] = 1.0, x, y, z
-        C[m + 4], C[m + 5], C[m + 6], C[m + 7], C[m + 8] = look_of(P, k, x, y, z, int(C[m + 8]))
+        C[m + 4], C[m + 5], C[m + 6], C[m + 7] = look_of(P, C, m + 8, k, x, y, z)
     return m + 4
+
+
+@njit(**FLAGS)
+def far_from(P, C, o, k, x, y, z, way):
+    """Whether a point is farther from surface k, one that is looked up, than `way`: by where it looked last, at once.
+
+    Where it does not hold nothing is known. The margin is more than the roundings of distances.
+    """
+    m = o + MEMORY + REMEMBERED * k
+    if C[m] != 1.0:
+        return False
+    moved = length3(x - C[m + 1], y - C[m + 2], z - C[m + 3])
+    return C[m + 4] > WIDE * (way + P[k * ROW + STEEP] * moved) + MARGIN * P[k * ROW + NEAR]
 
 
 # ------------------------------------------------------------------------------------------------- resting contact
@@ -57,6 +70,10 @@ def near(P, C, o, t, x, y, z, radius):
     for k in range(SURFACES):
         if KILLS and P[k * ROW + RESPONSE] == KILL:
             continue
+        if LOOKUPS and P[k * ROW + LOOKUP] != 0:
+            px, py, pz = place_of(P, k, t)
+            if far_from(P, C, o, k, x - px, y - py, z - pz, radius + P[k * ROW + NEAR]):
+                continue
         if distance(P, C, o, k, t, x, y, z) - radius <= P[k * ROW + NEAR]:
             return True
     return False
@@ -474,9 +491,6 @@ def march(P, C, o, k, gap, pace, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1,
 @njit(forceinline=True, **FLAGS)
 def curved_hit(P, C, o, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius):
     """Fraction at which a path first meets surface k: swept.first_hit; infinite where it does not."""
-    start = distance(P, C, o, k, t0, x0, y0, z0) - radius
-    end = distance(P, C, o, k, t0 + h, x1, y1, z1) - radius
-    level = min(start, 0.0)
     moves = P[k * ROW + MOTION] != 0
     swing = beyond = 0.0
     way = reach_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h)
@@ -488,6 +502,14 @@ def curved_hit(P, C, o, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h
         way = way + beyond
     if LOOKUPS and P[k * ROW + LOOKUP] != 0:
         way = P[k * ROW + STEEP] * way
+        px, py, pz = place_of(P, k, t0)
+        if far_from(P, C, o, k, x0 - px, y0 - py, z0 - pz, radius + way):
+            return np.inf
+    start = distance(P, C, o, k, t0, x0, y0, z0) - radius
+    if LOOKUPS and P[k * ROW + LOOKUP] != 0 and far_from(P, C, o, k, x0 - px, y0 - py, z0 - pz, radius + way):
+        return np.inf
+    end = distance(P, C, o, k, t0 + h, x1, y1, z1) - radius
+    level = min(start, 0.0)
     if not (start - level < way or end < level):
         return np.inf
     if LOOKUPS and P[k * ROW + LOOKUP] != 0:
@@ -715,6 +737,8 @@ def evict(P, C, o, t, x, y, z, vx, vy, vz, radius, bx, by, bz, began):
             if ORDER == 1 and P[k * ROW + SWEPT] == 0:
                 continue
             px, py, pz = place_of(P, k, t)
+            if LOOKUPS and P[k * ROW + LOOKUP] != 0 and far_from(P, C, o, k, x - px, y - py, z - pz, radius):
+                continue
             gap = gap_of(P, C, o, k, x - px, y - py, z - pz) - radius
             if not gap < 0:
                 continue

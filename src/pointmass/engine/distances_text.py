@@ -11,20 +11,19 @@ from numba import njit
 
 
 @njit(**FLAGS)
-def distances_look(P, k, x, y, z, guess):
-    """Signed distance and normal: DistanceGrid.look. The cell is found at once, without the guess."""
+def distances_look(P, k, x, y, z):
+    """Signed distance and normal: DistanceGrid.look."""
     row = k * ROW
     x, y, z = x - P[row + ORIGIN], y - P[row + ORIGIN + 1], z - P[row + ORIGIN + 2]
     first, second, third, u, v, w = cell_of(P, row, x, y, z)
     along = int(P[row + COUNTS + 2])
     across = along * int(P[row + COUNTS + 1])
     at = int(P[row + DATA]) + int(first) * across + int(second) * along + int(third)
-    gap, nx, ny, nz = distance_of(P, row, at, across, along, x, y, z, u, v, w)
-    return gap, nx, ny, nz, guess
+    return distance_of(P, row, at, across, along, x, y, z, u, v, w)
 
 
 @njit(**FLAGS)
 def distances_bound(P, k, x, y, z):
     """A lower bound of the way to the surface."""
-    gap, _, _, _, _ = distances_look(P, k, x, y, z, 0)
+    gap, _, _, _ = distances_look(P, k, x, y, z)
     return gap / P[k * ROW + STEEP]

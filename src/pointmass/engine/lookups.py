@@ -1,20 +1,32 @@
 """Prints the search in the data of surfaces that have any: for each kind of data, `NAME_look` and `NAME_bound`.
 
-`NAME_look(P, k, x, y, z, guess)` does what `look` of the surface does to one point: it returns the signed distance, the
-normal, and where in the data they are from: for the next point that is a guess, which costs time if it is wrong and
-changes nothing. `NAME_bound(P, k, x, y, z)` returns a lower bound of the distance, at once.
+`NAME_look` does what `look` of the surface does to one point: it returns the signed distance and the normal. It may
+remember, in the scratch array C from m on, what saves time at the next point and changes nothing; at first that is 0.
+`NAME_bound(P, k, x, y, z)` returns a lower bound of the distance, at once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from pointmass.collisions import distance_grid, triangles, triangulated
 from pointmass.engine.printing import function, statements
 from pointmass.tracing.columns import expanded
 from pointmass.tracing.trace import Traced, vector_names
 
+MOST_LISTED = 8  # triangles that a search remembers: those around a corner, and some more
+RESERVE = 0.1  # of a triangle's edge: how much farther than the nearest the others are that a search remembers
+LIST = {
+    "SEARCHED": 3,
+    "OTHERS": 1,
+    "LISTED": 1,
+    "LIST": MOST_LISTED,
+    "LEAST": MOST_LISTED,
+}  # what it remembers, with the size of each
 MARK = "# --- printed from here on\n"
 
 
@@ -26,7 +38,9 @@ def body_of(name: str) -> str:
 def _triangles(shape: int) -> str:
     """The text for meshes; `shape` is the column of a surface's row where the numbers of its shape begin."""
     numbers = {name: shape + j for j, name in enumerate(triangulated.NUMBERS) if name}
-    numbers |= {"TRIANGLE": len(_entries("P")), "FEATURES": triangles.FEATURES}
+    numbers |= {"TRIANGLE": len(_entries("P")), "FEATURES": triangles.FEATURES, "LONG": list(_entries("P")).index("a")}
+    numbers |= dict(zip(LIST, np.cumsum([0, *LIST.values()]).tolist(), strict=False))
+    numbers |= {"MOST_LISTED": MOST_LISTED, "RESERVE": RESERVE}
     constants = "".join(f"{name} = {value}\n" for name, value in numbers.items()) + f"SLACK = {triangles.SLACK!r}\n\n\n"
     point = dict(zip(vector_names("p"), "xyz", strict=True))
     entries = dict(list(_entries("P").items())[3:])
@@ -57,7 +71,28 @@ def _distances(shape: int) -> str:
 
 
 VECTORS = {"inverse": "INVERSE", "counts": "COUNTS", "extent": "REACH"}  # of a grid of distances
-TEXTS: Mapping[str, Callable[[int], str]] = {"triangles": _triangles, "distances": _distances}
+
+
+@dataclass(frozen=True)
+class Lookup:
+    """A kind of data.
+
+    Attributes
+    ----------
+    text : the functions; it takes the column of a surface's row where the numbers of its shape begin.
+    call : of `NAME_look`.
+    memory : how many numbers it remembers.
+    """
+
+    text: Callable[[int], str]
+    call: str
+    memory: int = 0
+
+
+LOOKUPS: Mapping[str, Lookup] = {
+    "triangles": Lookup(_triangles, "triangles_look(P, C, m, k, x, y, z)", sum(LIST.values())),
+    "distances": Lookup(_distances, "distances_look(P, k, x, y, z)"),
+}
 
 
 def _entries(array: str) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 `lookups` puts constants and laws before it: `triangle_of` and `outcome_of`, and names for the numbers of a surface's
 row. It finds what `collisions.triangles` finds, in another way: the tree of boxes is walked without a stack, from a
-bound that the cube around the point gives.
+bound that the triangles give which were near the last time, or one near the cube around the point.
 """
 # ruff: noqa: F821
 # mypy: ignore-errors
@@ -45,22 +45,50 @@ def triangles_bound(P, k, x, y, z):
 
 
 @njit(**FLAGS)
-def triangles_look(P, k, x, y, z, guess):
-    """Signed distance and normal: Triangulated.look. And the triangle; `guess` is one that may be near."""
+def triangles_look(P, C, m, k, x, y, z):
+    """Signed distance and normal: Triangulated.look.
+
+    From m on, C remembers the last search: where that was, which triangles were near (the first `LISTED` of them), and
+    how far all others were at least. Where they cannot be the nearest here either, only those that were near are asked.
+    """
     row = k * ROW
     boxes = int(P[row + DATA])
-    triangles, normals = boxes + int(P[row + TRIANGLES]), boxes + int(P[row + NORMALS])
-    count, leaves = int(P[row + COUNT]), int(P[row + LEAVES])
-    cube = triangles_cube(P, k, x, y, z)
-    which = int(P[boxes + int(P[row + HINTS]) + cube])
-    at = triangles + TRIANGLE * which
-    square, qx, qy, qz, feature = triangle_of(P, at, x - P[at], y - P[at + 1], z - P[at + 2])
-    at = triangles + TRIANGLE * guess
-    other, ax, ay, az, f = triangle_of(P, at, x - P[at], y - P[at + 1], z - P[at + 2])
-    if other < square or (other == square and guess < which):
-        square, qx, qy, qz, feature, which = other, ax, ay, az, f, guess
+    triangles = boxes + int(P[row + TRIANGLES])
     slack = SLACK * (P[row + EXTENT] + abs(x) + abs(y) + abs(z))
-    far = np.sqrt(square) + slack
+    moved = length3(x - C[m + SEARCHED], y - C[m + SEARCHED + 1], z - C[m + SEARCHED + 2]) + slack
+    if not moved < C[m + OTHERS]:
+        cube = triangles_cube(P, k, x, y, z)
+        C[m + LISTED], C[m + LIST] = 1.0, P[boxes + int(P[row + HINTS]) + cube]
+        C[m + OTHERS] = C[m + LEAST] = 0.0
+    which = -1
+    square = qx = qy = qz = feature = 0.0
+    far = np.inf
+    for j in range(int(C[m + LISTED])):
+        if C[m + LEAST + j] - moved > far:
+            continue
+        i = int(C[m + LIST + j])
+        at = triangles + TRIANGLE * i
+        other, ax, ay, az, f = triangle_of(P, at, x - P[at], y - P[at + 1], z - P[at + 2])
+        if which < 0 or other < square or (other == square and i < which):
+            square, qx, qy, qz, feature, which = other, ax, ay, az, f, i
+            far = np.sqrt(square)
+    if not far + moved < C[m + OTHERS]:
+        square, qx, qy, qz, feature, which = triangles_search(P, C, m, k, x, y, z, square, qx, qy, qz, feature, which)
+    at = boxes + int(P[row + NORMALS]) + 3 * (FEATURES * which + int(feature))
+    return outcome_of(P, row, qx, qy, qz, square, feature, P[at], P[at + 1], P[at + 2])
+
+
+@njit(**FLAGS)
+def triangles_search(P, C, m, k, x, y, z, square, qx, qy, qz, feature, which):
+    """The nearest triangle, beginning with one that may be; C remembers what else is near."""
+    row = k * ROW
+    boxes = int(P[row + DATA])
+    triangles = boxes + int(P[row + TRIANGLES])
+    count, leaves = int(P[row + COUNT]), int(P[row + LEAVES])
+    slack = SLACK * (P[row + EXTENT] + abs(x) + abs(y) + abs(z))
+    reserve = slack + RESERVE * np.sqrt(P[triangles + TRIANGLE * which + LONG])
+    far = np.sqrt(square) + reserve
+    listed, dropped = 1, np.inf
     node = 1
     while node > 0:
         b = boxes + 6 * node
@@ -75,15 +103,24 @@ def triangles_look(P, k, x, y, z, guess):
             for i in range(leaf * count // leaves, (leaf + 1) * count // leaves):
                 at = triangles + TRIANGLE * i
                 px, py, pz = x - P[at], y - P[at + 1], z - P[at + 2]
-                if abs(dot3(P[at + 9], P[at + 10], P[at + 11], px, py, pz)) <= far:
+                if i != which and abs(dot3(P[at + 9], P[at + 10], P[at + 11], px, py, pz)) <= far:
                     other, ax, ay, az, f = triangle_of(P, at, px, py, pz)
+                    farther, beaten = other, i
                     if other < square or (other == square and i < which):
+                        farther, beaten = square, which
                         square, qx, qy, qz, feature, which = other, ax, ay, az, f, i
-                        far = np.sqrt(square) + slack
+                        far = np.sqrt(square) + reserve
+                    if farther <= far * far:
+                        if listed < MOST_LISTED:
+                            C[m + LIST + listed], C[m + LEAST + listed] = beaten, np.sqrt(farther)
+                            listed += 1
+                        else:
+                            dropped = min(dropped, farther)
         while node & 1:  # the nodes above, of which this is the last part
             node >>= 1
         if node > 0:
             node += 1
-    at = normals + 3 * (FEATURES * which + int(feature))
-    gap, nx, ny, nz = outcome_of(P, row, qx, qy, qz, square, feature, P[at], P[at + 1], P[at + 2])
-    return gap, nx, ny, nz, which
+    C[m + SEARCHED], C[m + SEARCHED + 1], C[m + SEARCHED + 2] = x, y, z
+    C[m + LIST], C[m + LEAST], C[m + LISTED] = which, 0.0, listed
+    C[m + OTHERS] = min(np.sqrt(dropped), far) - slack
+    return square, qx, qy, qz, feature, which
