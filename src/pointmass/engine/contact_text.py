@@ -13,32 +13,32 @@ from numba import njit
 # --- printed from here on
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def dot3(ax, ay, az, bx, by, bz):
     """Scalar product."""
     return ax * bx + ay * by + az * bz
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def length3(x, y, z):
     """Length of a vector."""
     return np.sqrt(x * x + y * y + z * z)
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def size3(x, y, z):
     """The largest of three sizes."""
     return max(abs(x), abs(y), abs(z))
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def distance(P, C, o, k, t, x, y, z):
     """Signed distance of surface k."""
     px, py, pz = place_of(P, k, t)
     return gap_of(P, C, o, k, x - px, y - py, z - pz)
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def remembered(P, C, o, k, x, y, z):
     """Where the distance and the normal of surface k, one that is looked up, are kept for a point: it asks in turns."""
     m = o + MEMORY + REMEMBERED * k
@@ -64,7 +64,7 @@ def far_from(P, C, o, k, x, y, z, way):
 # ------------------------------------------------------------------------------------------------- resting contact
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def near(P, C, o, t, x, y, z, radius):
     """Whether a particle is within reach of a surface: if so, `find` wants to know its acceleration."""
     for k in range(SURFACES):
@@ -79,7 +79,7 @@ def near(P, C, o, t, x, y, z, radius):
     return False
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def find(P, C, o, t, x, y, z, vx, vy, vz, m, ax, ay, az, radius):
     """Who stands on what: Contacts.find. Returns the velocity, stopped."""
     count = 0
@@ -135,7 +135,7 @@ def find(P, C, o, t, x, y, z, vx, vy, vz, m, ax, ay, az, radius):
     return vx, vy, vz
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def choose_slide(P, C, r, t, vx, vy, vz, m, ax, ay, az):
     """Contacts._choose_slide; returns the velocity."""
     k = int(C[r])
@@ -167,7 +167,7 @@ def choose_slide(P, C, r, t, vx, vy, vz, m, ax, ay, az):
     return vx, vy, vz
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def bear(P, C, o, t, x, y, z, vx, vy, vz, m, fx, fy, fz):
     """The force on a particle, filtered by its contacts: Contacts.forces."""
     count = int(C[o])
@@ -203,7 +203,7 @@ def bear(P, C, o, t, x, y, z, vx, vy, vz, m, fx, fy, fz):
     return fx, fy, fz
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def bear_one(P, C, r, friction, fx, fy, fz):
     """Contacts._bear: the force, and whether the contact bears another one than before."""
     k = int(C[r])
@@ -240,7 +240,7 @@ def bear_one(P, C, r, friction, fx, fy, fz):
     return give(C, r, wx, wy, wz, fx, fy, fz)
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def give(C, r, wx, wy, wz, fx, fy, fz):
     """Contacts._give."""
     dx, dy, dz = wx - C[r + GIVEN], wy - C[r + GIVEN + 1], wz - C[r + GIVEN + 2]
@@ -248,7 +248,7 @@ def give(C, r, wx, wy, wz, fx, fy, fz):
     return fx + dx, fy + dy, fz + dz, length3(dx, dy, dz) > SETTLED * length3(wx, wy, wz)
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def product(a, b, c):
     """c = a b of 3 x 3 matrices, as flat arrays; c is another array than a and b."""
     for i in range(3):
@@ -256,7 +256,7 @@ def product(a, b, c):
             c[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j]
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def project(P, C, o, a, w):
     """Contacts.projection of one particle: the 3 x 3 matrix a, row by row; w is scratch of 18 numbers."""
     count = int(C[o])
@@ -282,7 +282,7 @@ def project(P, C, o, a, w):
                 a[i] = b[i]
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def settle(P, C, o, t, h, x, y, z, vx, vy, vz, radius):
     """Bring one that stood back to its surfaces at the end t of a piece of length h: Contacts.settle."""
     count = int(C[o])
@@ -339,7 +339,7 @@ def settle(P, C, o, t, h, x, y, z, vx, vy, vz, radius):
 # ------------------------------------------------------------------------------------------------------- impacts
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def respond(vx, vy, vz, nx, ny, nz, gx, gy, gz, restitution, friction):
     """Velocity after an impact: response.respond."""
     ux, uy, uz = vx - gx, vy - gy, vz - gz
@@ -355,7 +355,7 @@ def respond(vx, vy, vz, nx, ny, nz, gx, gy, gz, restitution, friction):
     return gx + wx, gy + wy, gz + wz
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def bounce(P, C, o, t, x, y, z, vx, vy, vz, radius):
     """The lecture's test at the end of a step, for surfaces of discrete contact: discrete.bounce.
 
@@ -381,21 +381,21 @@ def bounce(P, C, o, t, x, y, z, vx, vy, vz, radius):
     return x, y, z, vx, vy, vz, hit
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def position(s, h, a, b, c, d):
     """A coordinate of the cubic path at the fraction s: Paths.position; a, c at the ends, b, d their rates."""
     r = 1.0 - s
     return a * (r * r * (1.0 + 2.0 * s)) + c * (s * s * (3.0 - 2.0 * s)) + h * (b * (s * r * r) - d * (s * s * r))
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def velocity(s, h, a, b, c, d):
     """Its rate: Paths.velocity."""
     chord = (c - a) / (h if h > 0 else 1.0)
     return chord * (6.0 * s * (1.0 - s)) + b * ((1 - s) * (1 - 3 * s)) + d * (s * (3 * s - 2))
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def local_at(P, k, s, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h):
     """Place on the path relative to surface k: _Approach.local."""
     px, py, pz = place_of(P, k, t0 + s * h)
@@ -403,7 +403,7 @@ def local_at(P, k, s, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h):
     return x - px, y - py, z - pz
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def swing_of(P, k, t0, h):
     """How far a surface gets away from uniform motion: swept._swing."""
     most = 0.0
@@ -413,7 +413,7 @@ def swing_of(P, k, t0, h):
     return most * (h * h)
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def reach_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h):
     """Length of the control polygon: Paths.reach."""
     ax, ay, az = h * u0 / 3, h * v0 / 3, h * w0 / 3
@@ -422,7 +422,7 @@ def reach_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h):
     return length3(ax, ay, az) + middle + length3(cx, cy, cz)
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def bend_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h):
     """Bound of the second derivative: Paths.bends."""
     ax, ay, az = 6 * (x1 - x0), 6 * (y1 - y0), 6 * (z1 - z0)
@@ -431,7 +431,7 @@ def bend_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h):
     return max(length3(sx, sy, sz), length3(ex, ey, ez))
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def enters(P, C, o, k, ax, ay, az, bx, by, bz, radius, level):
     """Fraction from a at which a convex surface is met on the way to b: swept._newton; infinite if it is not."""
     dx, dy, dz = bx - ax, by - ay, bz - az
@@ -454,14 +454,14 @@ def enters(P, C, o, k, ax, ay, az, bx, by, bz, radius, level):
     return s
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def chords_for(bend, eps):
     """How many chords stay within eps: _Approach.chords."""
     ratio = bend / (8 * eps)
     return int(min(np.ceil(np.sqrt(ratio)), MOST_CHORDS)) if ratio > 1 else 1
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def pace_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h):
     """Bound of the first derivative: Paths.pace."""
     ax, ay, az, cx, cy, cz = h * u0, h * v0, h * w0, h * u1, h * v1, h * w1
@@ -469,7 +469,7 @@ def pace_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h):
     return max(max(length3(ax, ay, az), length3(cx, cy, cz)), middle)
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def march(P, C, o, k, gap, pace, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius, level):
     """Fractions between which a path goes into surface k, and the gaps there: swept._march; the first is infinite where
     it does not."""
@@ -611,7 +611,7 @@ def flat_hit(P, C, o, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, 
     return a
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def narrowed(a, b, s, last, gap, slope):
     """A step of swept._root: the bracket, the next place to look, how far it went, and whether that was all."""
     free, falls = gap >= 0, slope < 0
@@ -631,7 +631,7 @@ def narrowed(a, b, s, last, gap, slope):
     return a, b, s, last, arrived or not (b - a > RESOLUTION and a < s < b)
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def root(P, C, o, k, a, b, g_low, g_high, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius, level):
     """The crossing between a and b, on the free side: swept._root."""
     last = b - a
@@ -671,7 +671,7 @@ def first_hits(P, C, o, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, r
     return theta, which
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def strike(P, C, o, alone, events, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius):
     """Cast a path against the surfaces of swept contact and respond: ReferenceEngine._impacts for one particle.
 
@@ -725,7 +725,7 @@ def strike(P, C, o, alone, events, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w
     return x, y, z, vx, vy, vz, clock, events, gx, gy, gz
 
 
-@njit(**FLAGS)
+@njit(**APART)
 def evict(P, C, o, t, x, y, z, vx, vy, vz, radius, bx, by, bz, began):
     """Put one out that a surface pushed into another one: ReferenceEngine._evict.
 
