@@ -40,8 +40,9 @@ def _triangles(shape: int) -> str:
     numbers = {name: shape + j for j, name in enumerate(triangulated.NUMBERS) if name}
     numbers |= {"TRIANGLE": len(_entries("P")), "FEATURES": triangles.FEATURES, "LONG": list(_entries("P")).index("a")}
     numbers |= dict(zip(LIST, np.cumsum([0, *LIST.values()]).tolist(), strict=False))
-    numbers |= {"MOST_LISTED": MOST_LISTED, "RESERVE": RESERVE}
-    constants = "".join(f"{name} = {value}\n" for name, value in numbers.items()) + f"SLACK = {triangles.SLACK!r}\n\n\n"
+    numbers |= {"MOST_LISTED": MOST_LISTED}
+    constants = "".join(f"{name} = {value}\n" for name, value in numbers.items())
+    constants += f"SLACK = {triangles.SLACK!r}\nRESERVE = {RESERVE!r}\n\n\n"
     point = dict(zip(vector_names("p"), "xyz", strict=True))
     entries = dict(list(_entries("P").items())[3:])
     found = _law("triangle_of", "P, at, x, y, z", triangles.triangle(), point | entries)
