@@ -25,7 +25,7 @@ def test_models_are_closed_face_outwards_and_reach_below_the_ground(model):
 def slope(friction):
     """Flakes on one slope of tan(angle) = 0.7, at rest at first, and a second later."""
     scene = pm.SCENES["snow"].with_settings({**STILL, "friction": friction})
-    x = np.array([(-2.0, 2.0), (2.0, 2.0)])
+    x = np.array([(-2.0, -2.0), (2.0, 2.0)])
     ground = pm.HeightField(0.7 * x, (4.0, 4.0), restitution=0.0, friction=scene.friction)
     flakes = pm.Particles([(0.0, 1e-5, 0.3), (0.5, 0.35001, -0.4)], m=1e-5)
     forces = [pm.Gravity(), pm.Drag(1e-5 * 9.81 / scene.fall)]
