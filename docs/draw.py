@@ -283,7 +283,7 @@ def fireworks():
 
 def snow_scene():
     """The shipped scene snow."""
-    shipped("snow", 235)
+    shipped("snow", 240)
 
 
 def smoke_scene():

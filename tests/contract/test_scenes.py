@@ -93,7 +93,7 @@ ENDS = [
     for name, shipped in SCENES.items()
     for parameter in shipped.parameters()
     for value in parameter["choices"] or (parameter["minimum"], parameter["maximum"])
-    if parameter["name"] not in COSTLY or value == parameter["minimum"] >= 1
+    if value is not None and (parameter["name"] not in COSTLY or value == parameter["minimum"] >= 1)
 ]
 
 
