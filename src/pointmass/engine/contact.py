@@ -109,15 +109,8 @@ class ContactText:
             room = s.eps + ROUNDING[self._dtype] * float(np.abs(place).sum())
             kind = self._kinds.index(s.lookup or s.laws)
             numbers: list[float] = [kind, s.contact == "swept", motion, s.bulges, _flat(s)]
-            numbers += [
-                RESPONSES.index(s.response),
-                *s.impact,
-                s.eps,
-                room,
-                bool(s.lookup),
-                s.steepness,
-                self._starts[k],
-            ]
+            numbers += [RESPONSES.index(s.response), *s.impact, s.eps, room]
+            numbers += [bool(s.lookup), s.steepness, self._starts[k]]
             numbers += [*place, *s.shape]
             row[: len(numbers)] = numbers
         return self._table
@@ -134,12 +127,8 @@ class ContactText:
         numbers |= {"MOST_EVENTS": MOST_EVENTS, "EVICTIONS": EVICTIONS, "SETTLED": contact.SETTLED}
         rounding = contact.STILL * float(np.finfo(self._dtype).eps)
         numbers |= {"ROUND": rounding, "CREEP": max(contact.CREEP, rounding)}
-        numbers |= {
-            "MARGIN": swept.MARGIN,
-            "MOST_LOOKS": swept.MOST_LOOKS,
-            "WIDE": WIDE,
-            "SURFACES": len(self.surfaces),
-        }
+        numbers |= {"MARGIN": swept.MARGIN, "MOST_LOOKS": swept.MOST_LOOKS, "WIDE": WIDE}
+        numbers |= {"SURFACES": len(self.surfaces)}
         numbers |= {"ROW": self._row, "MEMORY": self._memory, "REMEMBERED": self._remembered}
         flat = [_flat(s) for s in self.surfaces]
         numbers |= {"LOOKUPS": self.looks_up}

@@ -20,13 +20,7 @@ from pointmass.tracing.trace import Traced, vector_names
 
 MOST_LISTED = 8  # triangles that a search remembers: those around a corner, and some more
 RESERVE = 0.1  # of a triangle's edge: how much farther than the nearest the others are that a search remembers
-LIST = {
-    "SEARCHED": 3,
-    "OTHERS": 1,
-    "LISTED": 1,
-    "LIST": MOST_LISTED,
-    "LEAST": MOST_LISTED,
-}  # what it remembers, with the size of each
+LIST = {"SEARCHED": 3, "OTHERS": 1, "LISTED": 1, "LIST": MOST_LISTED, "LEAST": MOST_LISTED}  # its memory, with sizes
 MARK = "# --- printed from here on\n"
 
 
