@@ -63,6 +63,11 @@ def printed(text, dtype="float64"):
     return store.plain("contacts", text, dtype)
 
 
+def compiled(text):
+    """The functions, each to be called from Python."""
+    return vars(store.load("contacts", text.replace("**FLAGS", "**ENTRY").replace("**APART", "**ENTRY"), "float64"))
+
+
 class Filter:
     """Contacts of all particles, each on its own."""
 
@@ -274,7 +279,7 @@ def test_clear_is_never_said_where_something_happens(world, radius):
     n, t0 = 4000, 0.2
     surfaces = surfaces_of(pm.ParticleSystem(pm.Particles([[0, 0, 0]]), (), WORLDS[world]()))
     text = ContactText(surfaces, 2, False, "float64")
-    table, clear = text.table(), store.load("contacts", text.text.replace("**FLAGS", "**ENTRY"), "float64").clear
+    table, clear = text.table(), compiled(text.text)["clear"]
 
     def clears(x0, v0, x1, v1, h):
         return np.array([clear(table, *x0[i], *v0[i], *x1[i], *v1[i], t0, h, radius) for i in range(n)])
@@ -303,7 +308,7 @@ def test_compiled_functions_give_the_same_bits(world, solver):
     for k in range(len(x)):
         engines = pair_of_engines(
             world, "swept", solver, x[k], v[k], 0.02, 0.7, lambda: [pm.Gravity((1, -9.81, 0))],
-            lambda text: vars(store.load("contacts", text.replace("**FLAGS", "**ENTRY"), "float64")), friction=0.2,
+            compiled, friction=0.2,
         )  # fmt: skip
         same_steps(engines, 1 / 60, 5)
 

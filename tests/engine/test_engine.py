@@ -357,7 +357,7 @@ def test_lanes_of_single_particles_are_vectors() -> None:
     still.particles.unpin([4])
     sim = pm.Simulation(still, pm.SymplecticEuler(), DT, compiled=True)
     sim.step()
-    (members,) = (group.members for group in sim.engine._grouped(None, 0.0))
+    (members,) = (group.members for group in sim.engine._grouped(None))
     source = store.complete("lanes", members.kernel.text, "float32").replace("**FLAGS", "**ENTRY")
     scope: dict[str, Any] = {}
     exec(compile(source.replace('"cache": True', '"cache": False'), "<lanes>", "exec"), scope)

@@ -38,7 +38,7 @@ from pointmass.engine.support import added, columns, exponent, mixed, scaled, se
 R = np.{dtype}
 OWNING = {{"_nrt": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True{fast}}}
 FLAGS = {{**OWNING, "_nrt": False, "pipeline_class": Inner}}  # of what makes no arrays: nobody counts references
-APART = {{**FLAGS, "forceinline": False}}  # Numba takes it over from the caller that is compiled first
+APART = FLAGS | {{"forceinline": False}}  # Numba takes it over from the caller that is compiled first
 ENTRY = {{"_nrt": False, "error_model": "numpy", "cache": True, "nogil": True{fast}}}  # of what Python calls
 OWNING_ENTRY = {{**ENTRY, "_nrt": True}}
 
