@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -69,6 +70,36 @@ def about(what: str) -> Iterator[None]:
         yield
     except InvalidInput as error:
         raise InvalidInput(f"{what}: {error}") from None
+
+
+@contextmanager
+def reading(what: str, path: str | Path, endings: Sequence[str]) -> Iterator[Path]:
+    """Read a file: whatever its reader runs into, the user hears in one sentence what is wrong with the file.
+
+    Parameters
+    ----------
+    what : in the file, such as "mesh".
+    endings : that are known, in small letters.
+
+    Raises
+    ------
+    InvalidInput
+        Another ending, no such file, or a reader that fails.
+    """
+    file = Path(path)
+    if file.suffix.lower() not in endings:
+        raise InvalidInput(f"{what} file {str(path)!r} must end in {', '.join(endings)}, not in {file.suffix!r}")
+    if not file.is_file():
+        raise InvalidInput(f"{what} file {str(path)!r} does not exist")
+    with about(f"{what} file {str(path)!r}"):
+        try:
+            yield file
+        except InvalidInput:
+            raise
+        except Exception as error:  # readers raise whatever their parsing of damaged bytes runs into
+            raise InvalidInput(
+                f"it is damaged or not what its ending says ({type(error).__name__}): write it again"
+            ) from None
 
 
 def floats(value: Any) -> np.ndarray | None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.errors import InvalidInput, about, finite_array, floats, shown
+from pointmass.errors import InvalidInput, finite_array, floats, reading, shown
 
 Vertices = NDArray[np.float64]
 Faces = NDArray[np.int64]
@@ -102,12 +102,7 @@ def read_mesh(path: str | Path) -> TriangleMesh:
     InvalidInput
         No such file, a file of another kind or cut off, no triangles in it, a vertex that is not finite.
     """
-    file = Path(path)
-    if file.suffix.lower() not in FORMATS:
-        raise InvalidInput(f"mesh file {str(path)!r} must end in {', '.join(FORMATS)}, not in {file.suffix!r}")
-    if not file.is_file():
-        raise InvalidInput(f"mesh file {str(path)!r} does not exist")
-    with about(f"mesh file {str(path)!r}"):
+    with reading("mesh", path, FORMATS) as file:
         return triangle_mesh(*_contents(file))
 
 
@@ -150,14 +145,9 @@ def _contents(file: Path) -> tuple[Any, Any]:
     """Vertices and faces of a file as they stand there."""
     import trimesh
 
-    try:
-        if file.suffix.lower() == ".gltf":
-            json.loads(file.read_bytes())  # of one that is none, trimesh would read a `model.gltf` beside it
-        found = trimesh.load(file, force="mesh", process=False)
-    except Exception as error:  # its readers raise whatever their parsing of bytes and text runs into
-        raise InvalidInput(
-            f"it is damaged or not what its ending says ({type(error).__name__}): write it again"
-        ) from None
+    if file.suffix.lower() == ".gltf":
+        json.loads(file.read_bytes())  # of one that is none, trimesh would read a `model.gltf` beside it
+    found = trimesh.load(file, force="mesh", process=False)
     if not isinstance(found, trimesh.Trimesh) or len(found.faces) == 0:
         raise InvalidInput("it holds no triangles")
     return np.asarray(found.vertices), np.asarray(found.faces)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pointmass.collisions.collider import Array, Contact, Response
 from pointmass.collisions.laws import along
 from pointmass.collisions.looked_up import LookedUp
-from pointmass.errors import InvalidInput, about, finite_array
+from pointmass.errors import InvalidInput, finite_array, reading
 from pointmass.laws.parameter import Vector
 from pointmass.tracing.functions import Number, Triple, dot, floor, length, maximum, sqrt, where
 from pointmass.tracing.trace import Traced, trace
@@ -146,7 +146,7 @@ class DistanceGrid(LookedUp):
         if isinstance(distances, (str, Path)):
             if spacing is not None or origin is not None:
                 raise InvalidInput("spacing and origin of a grid of distances from a file stand in the file")
-            distances, spacing, origin = _read(Path(distances))
+            distances, spacing, origin = _read(distances)
         self.values = finite_array("distances", distances, (None, None, None))
         if min(self.values.shape) < 2:
             raise InvalidInput(f"distances must be at least 2 x 2 x 2 numbers, not {self.values.shape}")
@@ -239,20 +239,11 @@ def _check_slope(values: NDArray[np.float64], spacing: NDArray[np.float64]) -> N
         )
 
 
-def _read(path: Path) -> Sequence[Any]:
+def _read(path: str | Path) -> Sequence[Any]:
     """Values, spacing and origin from a file."""
-    if path.suffix.lower() != ".npz":
-        raise InvalidInput(f"distance file {str(path)!r} must end in .npz, not in {path.suffix!r}")
-    if not path.is_file():
-        raise InvalidInput(f"distance file {str(path)!r} does not exist")
-    with about(f"distance file {str(path)!r}"):
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                arrays = {name: data[name] for name in data.files}
-        except Exception as error:  # whatever NumPy's readers run into in damaged files
-            raise InvalidInput(
-                f"it is damaged or not what its ending says ({type(error).__name__}): write it again"
-            ) from None
+    with reading("distance", path, [".npz"]) as file:
+        with np.load(file, allow_pickle=False) as data:
+            arrays = {name: data[name] for name in data.files}
         for name in ("values", "spacing", "origin"):
             if name not in arrays:
                 raise InvalidInput(f"it has no array {name!r}; it has {', '.join(arrays) or 'none'}")

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pointmass.collisions.collider import Contact, Response
 from pointmass.collisions.triangulated import Triangulated
-from pointmass.errors import InvalidInput, about, finite_array, number
+from pointmass.errors import InvalidInput, finite_array, number, reading
 from pointmass.laws.parameter import Vector
 from pointmass.meshes import TriangleMesh
 
@@ -62,7 +62,7 @@ class HeightField(Triangulated):
         contact: Contact = "swept",
         response: Response = "bounce",
     ) -> None:
-        values = _read(Path(heights)) if isinstance(heights, (str, Path)) else _checked(heights)
+        values = _read(heights) if isinstance(heights, (str, Path)) else _checked(heights)
         sides = finite_array("size", size, (2,))
         if (sides <= 0).any():
             raise InvalidInput(f"size = {size} is not allowed: the lengths of the ground must be greater than 0 [m]")
@@ -79,23 +79,10 @@ def _checked(heights: Any) -> NDArray[np.float64]:
     return values
 
 
-def _read(path: Path) -> NDArray[np.float64]:
+def _read(path: str | Path) -> NDArray[np.float64]:
     """Heights from a file."""
-    known = (*ARRAYS, *IMAGES)
-    if path.suffix.lower() not in known:
-        raise InvalidInput(f"height file {str(path)!r} must end in {', '.join(known)}, not in {path.suffix!r}")
-    if not path.is_file():
-        raise InvalidInput(f"height file {str(path)!r} does not exist")
-    with about(f"height file {str(path)!r}"):
-        try:
-            found = _array(path) if path.suffix.lower() in ARRAYS else _image(path)
-        except InvalidInput:
-            raise
-        except Exception as error:  # whatever NumPy's and Pillow's readers run into in damaged files
-            raise InvalidInput(
-                f"it is damaged or not what its ending says ({type(error).__name__}): write it again"
-            ) from None
-        return _checked(found)
+    with reading("height", path, (*ARRAYS, *IMAGES)) as file:
+        return _checked(_array(file) if file.suffix.lower() in ARRAYS else _image(file))
 
 
 def _array(path: Path) -> Any:
