@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pointmass.collisions.impacts import NO_IMPACTS, Impacts
 from pointmass.engine.binding import kinds
 from pointmass.engine.energy import PairEnergy
-from pointmass.engine.island import IslandKernel, Outcome, Span
+from pointmass.engine.island import IslandKernel, Outcome, Span, everybody
 from pointmass.engine.lanes import LanesKernel, topologies
 from pointmass.engine.lattice import LatticeKernel, grid
 from pointmass.engine.phases import simple
@@ -208,7 +208,7 @@ class Engine:
         look_inside : whether `state_at` will be asked for a time within the last step.
         """
         p = self.system.particles
-        self.died = self.died[:0]
+        self.died, self._hit = self.died[:0], self._hit[:0]
         self._last = span, births, p.id, self.reference.left()
         before = self._room()
         groups = [] if look_inside else self._grouped(births)
@@ -453,8 +453,7 @@ class Engine:
         return self._group(rows, self._kernel(kind, *how).members(rows, islands[rows]))
 
     def _group(self, rows: Rows, members: Members) -> Group:
-        everybody = len(rows) == len(self.system.particles) and bool((np.diff(rows) == 1).all())
-        return Group(None if everybody else rows, members)
+        return Group(None if everybody(rows, len(self.system.particles)) else rows, members)
 
     def _kernel(self, kind: Any, *how: bool) -> Any:
         """The kernel of a kind for the system as it is, printed once."""
@@ -483,11 +482,6 @@ def compiled_by_default() -> bool:
     if named not in ("compiled", "reference"):
         raise InvalidInput(f"POINTMASS_ENGINE = {named!r} is not allowed: it must be 'compiled' or 'reference'")
     return named == "compiled"
-
-
-def _everybody(rows: Rows, islands: Rows) -> bool:
-    """Whether rows are those of all particles, in order."""
-    return len(rows) == len(islands) and bool((np.diff(rows) == 1).all())
 
 
 def _taken(array: Array, rows: Rows | None) -> Array:

@@ -14,7 +14,7 @@ WORK = ("x0", "v0", "bx", "px", "pv", "ground", "a1", "a2")  # arrays of an isla
 XYZ = ("x", "y", "z")
 
 
-class Impacts:
+class ImpactText:
     """The two functions for a system.
 
     Parameters

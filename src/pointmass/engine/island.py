@@ -19,7 +19,7 @@ from pointmass.engine.adaptive import control_text
 from pointmass.engine.binding import Binder
 from pointmass.engine.blocks import Kind, Layout, layout, slices
 from pointmass.engine.forces import LANES, Deriv, Incidence, incidence, tiled
-from pointmass.engine.impacts import WORK, Impacts
+from pointmass.engine.impacts import WORK, ImpactText
 from pointmass.engine.implicit import implicit_text
 from pointmass.engine.pairs import FULL, PairArrays
 from pointmass.engine.phases import REACHED
@@ -115,12 +115,12 @@ class IslandKernel:
         self.step = self._step_text()
         self.text = REACHED + self.functions_text + self._run()
 
-    def _impacts(self) -> Impacts | None:
+    def _impacts(self) -> ImpactText | None:
         deriv = self.deriv
         if deriv.contact is None:
             return None
         row = [deriv.binder.attribute(name, "g") for name in ("w", "m", "radius")]
-        return Impacts(deriv.contact, self.system.order, deriv.loop, deriv.flags, deriv.call, *row)
+        return ImpactText(deriv.contact, self.system.order, deriv.loop, deriv.flags, deriv.call, *row)
 
     def _step_text(self) -> StepText:
         if isinstance(self.solver, Implicit):
@@ -378,6 +378,11 @@ def entry_text(scratch: Sequence[str], given: str, lines: Sequence[str]) -> str:
     return "\n".join(head) + function("run", f"{given}, {made}", "**ENTRY", lines).removesuffix("\n\n")
 
 
+def everybody(rows: Rows, count: int) -> bool:
+    """Whether rows are those of all of `count` particles, in order."""
+    return len(rows) == count and bool((np.diff(rows) == 1).all())
+
+
 class IslandMembers:
     """The islands of a group in the order of the kernel's rows.
 
@@ -393,8 +398,7 @@ class IslandMembers:
         self.first = np.append(np.flatnonzero(np.diff(labels, prepend=-1)), len(rows)).astype(np.int64)
         self.place = np.full(len(kernel.system.particles), -1, np.intp)
         self.place[rows] = np.arange(len(rows))
-        everybody = len(rows) == len(self.place) and bool((np.diff(rows) == 1).all())
-        self.order = None if everybody else rows
+        self.order = None if everybody(rows, len(self.place)) else rows
         self.pairs = [PairArrays(p, kernel.system.particles, self.place) for p in kernel.deriv.pairs]
         elements = [self._elements(f.force) for f in kernel.deriv.families]
         self.families = [self._family(*each) for each in elements] if kernel.deriv.implicit else []
