@@ -10,14 +10,10 @@ from hypothesis import strategies as st
 
 import pointmass as pm
 from pointmass.solvers import SOLVERS
+from tests.shapes import SHEET, TETRAHEDRON
 
 X, Z = np.meshgrid(np.linspace(-2.2, 2.2, 10), np.linspace(-2.2, 2.2, 9), indexing="ij")
 HILLS = 0.3 * np.sin(2 * X) * np.cos(Z)
-TETRAHEDRON = (
-    [[0.9, 0.9, 0.9], [0.9, -0.9, -0.9], [-0.9, 0.9, -0.9], [-0.9, -0.9, 0.9]],
-    [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
-)
-SHEET = ([[-1, 0, -1], [-1, 0.2, 1], [1, 0.5, 1], [1, -0.1, -1], [0, 0.8, 0]], [[0, 1, 4], [1, 2, 4], [2, 3, 4]])
 GRID = np.stack(np.meshgrid(*[np.linspace(-1.2, 1.2, 13)] * 3, indexing="ij"))
 PEAR = np.sqrt(GRID[0] ** 2 + (1.2 * GRID[1]) ** 2 + GRID[2] ** 2) / 1.2 - 0.6 + 0.1 * GRID[1]
 EXAMPLES = {

@@ -17,6 +17,7 @@ from pointmass.engine.contact import ContactText
 from pointmass.engine.reference import KILLED, ReferenceEngine, surfaces_of
 from pointmass.solvers import SOLVERS
 from tests import naive
+from tests.shapes import SHEET, TETRAHEDRON
 
 PLATE = [[-1, 0.3, -1], [-1, 0.3, 1], [0.4, 0, 1], [0.4, 0, -1]]
 WORLDS = {
@@ -39,13 +40,8 @@ WORLDS["round"] = lambda **k: [
     pm.Cylinder((0, -1.2, 0), (0.1, 1.4, 0), radius=1.3, inside=True, **k),
     pm.Cylinder((0.8, 0.8, 0), (1, 1, 0.3), radius=0.2, **k),
 ]
-BLOCK = (
-    [[0.9, 0.9, 0.9], [0.9, -0.9, -0.9], [-0.9, 0.9, -0.9], [-0.9, -0.9, 0.9]],
-    [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
-)
-SHEET = ([[-1, 0, -1], [-1, 0.2, 1], [1, 0.5, 1], [1, -0.1, -1], [0, 0.8, 0]], [[0, 1, 4], [1, 2, 4], [2, 3, 4]])
 HILLS = 0.3 * np.sin(np.arange(7))[:, None] * np.cos(np.arange(6))
-WORLDS["meshes"] = lambda **k: [pm.Mesh(BLOCK, **k), pm.Mesh(SHEET, shift=(0, "1.2+0.2*sin(8*t)", 0), **k)]
+WORLDS["meshes"] = lambda **k: [pm.Mesh(TETRAHEDRON, **k), pm.Mesh(SHEET, shift=(0, "1.2+0.2*sin(8*t)", 0), **k)]
 WORLDS["hills"] = lambda **k: [pm.HeightField(HILLS, (2.5, 2.5), **k), pm.Plane((0, -1.2, 0), **k)]
 PEBBLE = np.linalg.norm(np.indices((9, 9, 9)) - 4.0, axis=0) / 4 - 0.6
 WORLDS["pebbles"] = lambda **k: [
