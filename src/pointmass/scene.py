@@ -356,8 +356,6 @@ def _plain(value: Any, where: str, folder: Path | None) -> Any:
         return {str(k): _plain(v, where, folder) for k, v in value.items() if v is not None}
     if isinstance(value, (list, tuple, range)):
         return [_plain(v, where, folder) for v in value]
-    if isinstance(value, TriangleMesh):
-        return [value.vertices.tolist(), value.faces.tolist()]
     if isinstance(value, Path) or (isinstance(value, str) and where.endswith(PATHS)):
         return _way(value, folder)
     if isinstance(value, (str, bool, int, float)):

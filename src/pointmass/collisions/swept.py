@@ -218,8 +218,7 @@ def first_hit(surface: Collider, paths: Paths) -> Array:
         approach = approach.take(rows)
         low, high = _march(approach) if surface.lookup else _brackets(approach)
         theta[rows[low == high]] = low[low == high]
-        crossed = low < high
-        crossed &= np.isfinite(high)
+        crossed = (low < high) & np.isfinite(high)
         if crossed.any():
             approach = approach.take(crossed)
             theta[rows[crossed]] = approach.free_side(_root(approach, low[crossed], high[crossed]))

@@ -84,11 +84,11 @@ def find(P, C, o, t, x, y, z, vx, vy, vz, m, ax, ay, az, radius):
     """Who stands on what: Contacts.find. Returns the velocity, stopped."""
     count = 0
     for k in range(SURFACES):
+        if KILLS and P[k * ROW + RESPONSE] == KILL:
+            continue
         px, py, pz = place_of(P, k, t)
         lx, ly, lz = x - px, y - py, z - pz
         gap = gap_of(P, C, o, k, lx, ly, lz) - radius
-        if KILLS and P[k * ROW + RESPONSE] == KILL:
-            continue
         if not gap <= P[k * ROW + NEAR]:
             continue
         nx, ny, nz = normal_of(P, C, o, k, lx, ly, lz)
@@ -491,10 +491,9 @@ def march(P, C, o, k, gap, pace, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1,
 @njit(forceinline=True, **FLAGS)
 def curved_hit(P, C, o, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius):
     """Fraction at which a path first meets surface k: swept.first_hit; infinite where it does not."""
-    moves = P[k * ROW + MOTION] != 0
-    swing = beyond = 0.0
+    swing = beyond = 0.0  # of a surface at rest
     way = reach_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h)
-    if MOVING and moves:
+    if MOVING and P[k * ROW + MOTION] != 0:
         px, py, pz = place_of(P, k, t0)
         qx, qy, qz = place_of(P, k, t0 + h)
         swing = swing_of(P, k, t0, h)
@@ -513,10 +512,7 @@ def curved_hit(P, C, o, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h
     if not (start - level < way or end < level):
         return np.inf
     if LOOKUPS and P[k * ROW + LOOKUP] != 0:
-        pace = pace_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h)
-        if moves:
-            pace = pace + beyond
-        pace = P[k * ROW + STEEP] * pace
+        pace = P[k * ROW + STEEP] * (pace_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h) + beyond)
         low, high, g_low, g_high = march(
             P, C, o, k, start - level, pace,
             x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius, level,
@@ -535,9 +531,7 @@ def curved_hit(P, C, o, k, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h
 @njit(forceinline=True, **FLAGS)
 def chord_hit(P, C, o, k, swing, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h, radius, level):
     """The same by chords: swept._brackets."""
-    bend = bend_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h)
-    if P[k * ROW + MOTION] != 0:
-        bend = bend + swing
+    bend = bend_of(x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, h) + swing
     chords = chords_for(bend, P[k * ROW + NEAR])
     ax, ay, az = local_at(P, k, 0.0, x0, y0, z0, u0, v0, w0, x1, y1, z1, u1, v1, w1, t0, h)
     low = 0.0

@@ -32,13 +32,13 @@ def body_of(name: str) -> str:
 def _triangles(shape: int) -> str:
     """The text for meshes; `shape` is the column of a surface's row where the numbers of its shape begin."""
     numbers = {name: shape + j for j, name in enumerate(triangulated.NUMBERS) if name}
-    numbers |= {"TRIANGLE": len(_entries("P")), "FEATURES": triangles.FEATURES, "LONG": list(_entries("P")).index("a")}
+    numbers |= {"TRIANGLE": len(_entries()), "FEATURES": triangles.FEATURES, "LONG": list(_entries()).index("a")}
     numbers |= dict(zip(LIST, np.cumsum([0, *LIST.values()]).tolist(), strict=False))
     numbers |= {"MOST_LISTED": MOST_LISTED}
     constants = "".join(f"{name} = {value}\n" for name, value in numbers.items())
     constants += f"SLACK = {triangles.SLACK!r}\nRESERVE = {RESERVE!r}\n\n\n"
     point = dict(zip(vector_names("p"), "xyz", strict=True))
-    entries = dict(list(_entries("P").items())[3:])
+    entries = dict(list(_entries().items())[3:])
     found = _law("triangle_of", "P, at, x, y, z", triangles.triangle(), point | entries)
     own = {"half": "P[row + HALF]", "side": "P[row + SIDE]", "small": "P[row + SMALL]"}
     looked = ["qx", "qy", "qz", "square", "feature", "nx", "ny", "nz"]
@@ -90,10 +90,10 @@ LOOKUPS: Mapping[str, Lookup] = {
 }
 
 
-def _entries(array: str) -> dict[str, str]:
+def _entries() -> dict[str, str]:
     """The numbers of a triangle in the data, in their order: see `TriangleTree.numbers`."""
     vectors = [n for v in ("corner", "e1", "e2", "n") for n in vector_names(v)]
-    return {n: f"{array}[at + {j}]" for j, n in enumerate([*vectors, "a", "b", "c", "inverse", "third"])}
+    return {n: f"P[at + {j}]" for j, n in enumerate([*vectors, "a", "b", "c", "inverse", "third"])}
 
 
 def _law(name: str, arguments: str, law: Traced, names: Mapping[str, str]) -> str:

@@ -250,7 +250,7 @@ class ReferenceEngine:
         doomed = np.zeros(len(p), bool)
         bounced: list[Impacts] = []
         for surface in self._discrete:
-            before = v.copy()
+            before = v.copy() if self.watched else v
             hit = bounce(surface, x, v, end, p.radius, moved)
             reset[islands[hit]] = True
             doomed |= hit & (surface.response == "kill")

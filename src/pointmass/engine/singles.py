@@ -317,9 +317,9 @@ class SinglesKernel:
             for q in "xv"[: self.system.order]
             for k in range(3)
         ]
-        if self.remembers:  # each lane has its own contacts: from one step to the next it is near the same triangles
-            record = island.deriv.contact.record  # type: ignore[union-attr]
-            call = call.replace(", K, ", f", K[{record} * i:{record} * (i + 1)], ")
+        contact = island.deriv.contact
+        if contact is not None and contact.looks_up:  # each lane is near the same triangles from step to step
+            call = call.replace(", K, ", f", K[{contact.record} * i:{contact.record} * (i + 1)], ")
         begin = ["clock = max(clock, birth[lo + i])"] if self.births else []
         mortal = island.deadly
         alive = " and died[lo + i] == 0" if mortal else ""
