@@ -337,7 +337,10 @@ class Particles:
         if given.size and given.dtype.kind not in "iu":
             given = np.zeros(0)
         result = given.astype(np.int64)
-        if result.shape != (n,) or len(np.unique(result)) != n or (self.rows(result) >= 0).any():
+        later = bool(
+            len(self) and result.size and result.min() > self.id.max()
+        )  # of most births, which takes no search
+        if result.shape != (n,) or len(np.unique(result)) != n or not (later or (self.rows(result) < 0).all()):
             raise InvalidInput(f"id must be {n} whole numbers that no other particle has")
         return result
 

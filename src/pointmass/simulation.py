@@ -354,7 +354,7 @@ class Simulation:
         self._lineage.settle(born, t1)
         p = self.system.particles
         rows = p.rows(np.append(self._deaths.due(t1), self._lineage.taken))
-        gone = killed(self.zones, p.x, t1, p.age > 0)
+        gone = killed(self.zones, p.x, t1, p.age > 0) if self.zones else np.zeros(len(p), bool)
         gone[self.engine.died] = True
         spared = p.rows(self._lineage.spared)
         gone[spared[spared >= 0]] = False

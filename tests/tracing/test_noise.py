@@ -32,7 +32,7 @@ def test_equals_the_plain_version():
 
 def test_the_same_numbers_on_every_machine():
     assert float(pm.noise(0.25, 1.5, -3.75)).hex() == "-0x1.eb9a512aa167ep+0"
-    assert float(pm.noise(0.25, 1.5, -3.75, 0.125, seed=5, octaves=3)).hex() == "-0x1.26822ae381e8dp+0"
+    assert float(pm.noise(0.25, 1.5, -3.75, 0.125, seed=5, octaves=3)).hex() == "-0x1.26822ae381e88p+0"
 
 
 @pytest.mark.parametrize("orders", [(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1), (1, 1, 0, 0), (0, 0, 1, 1)])

@@ -239,13 +239,14 @@ class ContactText:
             terms = [(n, v, p) for n, v, p in zip(normal, value, parts, strict=True) if v != 0]
             return " + ".join({1.0: p, -1.0: f"(-{p})"}.get(v, f"{n} * {p}") for n, v, p in terms)
 
-        lines.begin += [f"{tag}low = {along('x0', 'y0', 'z0')}", f"{tag}fast = abs({along('u0', 'v0', 'w0')})"]
+        lines.begin.append(f"{tag}low = {along('x0', 'y0', 'z0')}")
         lines.lane += [
-            f"{tag}d, {tag}f = {along('x1', 'y1', 'z1')}, abs({along('u1', 'v1', 'w1')})",
-            f"{tag}low = {tag}low if {tag}low < {tag}d else {tag}d",
-            f"{tag}fast = {tag}fast if {tag}fast > {tag}f else {tag}f",
+            f"{tag}a = {along('x0', 'y0', 'z0')} + third * ({along('u0', 'v0', 'w0')})",
+            f"{tag}b = {along('x1', 'y1', 'z1')}",
+            f"{tag}c = {tag}b - third * ({along('u1', 'v1', 'w1')})",
+            *(f"{tag}low = {tag}low if {tag}low < {tag}{p} else {tag}{p}" for p in "abc"),
         ]
-        lines.results.append(f"{tag}low + {tag}gap - third * {tag}fast > {tag}room + size")
+        lines.results.append(f"{tag}low + {tag}gap > {tag}room + size")
 
     def _clear_by_hull(self, k: int, apart: Traced, dtype: str, table: str, lines: ClearLines) -> None:
         """The hull of the control points is apart from the surface."""

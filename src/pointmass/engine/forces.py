@@ -85,19 +85,15 @@ class Deriv:
     ----------
     parallel : whether its loops are those of all threads.
     implicit : whether resting contact is that of the start of a piece, and elements have blocks of a Jacobian.
-    alone : whether it is for particles that are islands of their own, on which no element acts.
-    binder : that another kernel uses too.
     """
 
-    def __init__(
-        self, system: ParticleSystem, parallel: bool, implicit: bool, alone: bool = False, binder: Binder | None = None
-    ) -> None:
-        self.system, self.parallel, self.implicit, self.alone = system, parallel, implicit, alone
+    def __init__(self, system: ParticleSystem, parallel: bool, implicit: bool) -> None:
+        self.system, self.parallel, self.implicit = system, parallel, implicit
         self.contact: ContactText | None = None
         if system.colliders:
             self.contact = ContactText(surfaces_of(system), system.order, implicit, str(system.particles.dtype))
         self.order = system.order
-        self.binder = binder or Binder(system.particles, Table("C"))
+        self.binder = Binder(system.particles, Table("C"))
         self.families: list[Elements] = []
         self.pairs: list[Pairs] = []
         self.loop = "prange" if parallel else "range"
@@ -148,9 +144,9 @@ class Deriv:
                 timed, lines = unary(self.binder, force, f"f{k}", UNARY, "g")
                 self._at_time += timed
                 stages[-1] += lines
-            elif isinstance(force, ElementForce) and not self.alone:
+            elif isinstance(force, ElementForce):
                 stages += [self._elements(force, f"f{k}"), []]
-            elif isinstance(force, PairForce) and not self.alone:
+            elif isinstance(force, PairForce):
                 evaluate, lines = self._pairs(force)
                 before += evaluate
                 stages[-1] += lines

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from pointmass.engine import store
 from pointmass.engine.adaptive import control_text
-from pointmass.engine.binding import Binder
 from pointmass.engine.blocks import Kind, Layout, layout, slices
+from pointmass.engine.contact import ContactText
 from pointmass.engine.forces import LANES, Deriv, Incidence, incidence, tiled
 from pointmass.engine.impacts import WORK, ImpactText
 from pointmass.engine.implicit import implicit_text
@@ -103,14 +103,12 @@ class IslandKernel:
         system: ParticleSystem,
         solver: Solver,
         parallel: bool,
-        alone: bool = False,
-        binder: Binder | None = None,
         watched: bool = False,
     ) -> None:
         self.system, self.solver = system, solver
         self._watched = watched
         self.dtype = str(system.particles.dtype)
-        self.deriv = Deriv(system, parallel, solver.implicit, alone, binder)
+        self.deriv = Deriv(system, parallel, solver.implicit)
         self.impacts = self._impacts()
         self.step = self._step_text()
         self.text = REACHED + self.functions_text + self._run()
@@ -144,13 +142,6 @@ class IslandKernel:
     def watched(self) -> bool:
         """Whether it tells who hits a surface."""
         return self._watched and self.impacts is not None
-
-    def marked(self, hit: NDArray[np.uint8]) -> Rows:
-        """Who has hit a surface by its mark, or may have: the lecture's test at the end of a step leaves none."""
-        contact = self.deriv.contact
-        if not self.watched:
-            return np.zeros(0, np.intp)
-        return np.arange(len(hit)) if contact is not None and contact.discrete else np.flatnonzero(hit)
 
     @property
     def work(self) -> list[str]:
@@ -378,6 +369,11 @@ def entry_text(scratch: Sequence[str], given: str, lines: Sequence[str]) -> str:
     return "\n".join(head) + function("run", f"{given}, {made}", "**ENTRY", lines).removesuffix("\n\n")
 
 
+def marked(contact: ContactText | None, hit: NDArray[np.uint8]) -> Rows:
+    """Who has hit a surface by its mark, or may have: the lecture's test at the end of a step leaves none."""
+    return np.arange(len(hit)) if contact is not None and contact.discrete else np.flatnonzero(hit)
+
+
 def everybody(rows: Rows, count: int) -> bool:
     """Whether rows are those of all of `count` particles, in order."""
     return len(rows) == count and bool((np.diff(rows) == 1).all())
@@ -450,7 +446,7 @@ class IslandMembers:
         dtype = self.kernel.system.particles.dtype
         data = deriv.binder.data(count, self.order)
         contact = [] if deriv.contact is None else [deriv.contact.table()]
-        died, hit = np.zeros((2, count), np.uint8)
+        died, hit = np.zeros(count, np.uint8), np.zeros(count * self.kernel.watched, np.uint8)
         starts, most = [], [int(np.diff(self.first).max(initial=0))]
         for k, family in enumerate(deriv.families):
             data += [self.tiles[k].nodes, family.tiled.array(len(self.tiled[k]), dtype, self.tiled[k])]
@@ -515,7 +511,7 @@ class IslandMembers:
             for pairs in self.pairs:
                 pairs.enlarge()
         again = bool((status == FULL).any())
-        told = self.rows[died > 0], self.rows[self.kernel.marked(hit)]
+        told = self.rows[died > 0], self.rows[marked(self.kernel.deriv.contact, hit)]
         return Outcome(not status.any(), reach.max(axis=0), stats, again, *told)
 
     def _view(self, memory: Memory, name: str, part: int) -> Array:

@@ -243,6 +243,23 @@ def _number(shift: int, bits: int) -> Whole:
     )
 
 
+@cache
+def _level(shift: int) -> Whole:
+    """A number of a gradient, around 0, from ten bits of a hash.
+
+    Kernels put them into those of a float32 from 1024 to 2048, which takes no conversion.
+    """
+    middle = 0.5 * (LEVELS - 1)
+    low = 23 - BITS  # bit of the float32 where they go
+    move = f"<< np.uint32({low - shift})" if shift <= low else f">> np.uint32({shift - low})"
+    part = f"({{0}} {move}) & np.uint32({(LEVELS - 1) << low})"
+    start = np.float32(LEVELS).view(np.uint32)
+    return Whole(
+        lambda h, like: _number(shift, BITS).function(h, like) - like.dtype.type(middle),
+        f"({{real}}(np.uint32(({part}) | np.uint32({start})).view(np.float32)) - {{real}}({LEVELS + middle}))",
+    )
+
+
 WHOLE = Whole(lambda a: a.astype(np.int32).astype(np.uint32), "np.uint32(np.int32({0}))")
 AFTER = Whole(
     lambda i: (i + np.uint32(1)) & np.uint32(0xFFFFFF), "np.uint32(({0} + np.uint32(1)) & np.uint32(0xFFFFFF))"
@@ -292,20 +309,19 @@ def _cell(a: Symbol) -> Cell:
 def _gradient(h: Symbol, component: int, order: int, time: Sequence[Symbol], like: Symbol) -> list[Number]:
     """The gradient of a lattice point, or a derivative of it in time: three whole numbers around 0."""
     own = _plus(PRIME_OF_COMPONENT * (component + 1) % 2**32)(h)
-    shifts = [_number(BITS * k, BITS) for k in range(3)]
-    middle = 0.5 * (LEVELS - 1)
+    levels = [_level(BITS * k) for k in range(3)]
     if not time:
         last = MIXED(own)
-        return [shift(last, like) - middle for shift in shifts]
+        return [level(last, like) for level in levels]
     moment = _number(8, 24)(h, like) * 2.0**-24
     before, after, part = _cell(time[0] + moment)
     first, second = (MIXED(SUM(own, _times(PRIME_OF_TIME)(k))) for k in (before, after))
     s = _power_series(FADE.deriv(order), part) if order else _power_series(FADE, part)
     result = []
-    for shift in shifts:
-        a = shift(first, like)
-        change = s * (shift(second, like) - a)
-        result.append(change if order else (a - middle) + change)
+    for level in levels:
+        a = level(first, like)
+        change = s * (level(second, like) - a)
+        result.append(change if order else a + change)
     return result
 
 
@@ -329,8 +345,14 @@ def _faded(gradients: Any, cells: Sequence[Cell], orders: Sequence[int], timed: 
 
 
 def _ends(u: Number, end: int, order: int) -> tuple[Number, Number]:
-    fade = FADE if end else 1 - FADE
-    return tuple(_power_series(f.deriv(order) if order else f, u) for f in (fade, fade * Polynomial([-end, 1])))
+    """Derivatives of the fade of an end, and of its product with the distance from the end."""
+
+    def fade(k: int) -> Number:
+        s = _power_series(FADE.deriv(k), u)
+        return s if end else (-s if k else 1.0 - s)
+
+    product = fade(order) * (u - float(end))
+    return fade(order), product + order * fade(order - 1) if order else product
 
 
 def _power_series(f: Polynomial, u: Number) -> Number:
