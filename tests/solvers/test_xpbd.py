@@ -164,6 +164,8 @@ def test_colours():
         assert len(nodes) == len(set(nodes.tolist()))
     assert set(colours.tolist()) == set(range(colours.max() + 1))
     np.testing.assert_array_equal(colours, coloured(rows, 40))
+    pairs = np.stack([np.arange(99), np.arange(1, 100)], axis=1)
+    assert coloured(pairs, 100).max() <= 2  # at most two others at each
     star = np.stack([np.zeros(200, int), np.arange(1, 201)], axis=1)
     assert sorted(coloured(star, 201).tolist()) == list(range(200))
     assert len(coloured(np.zeros((0, 2), int), 5)) == 0

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Rows = NDArray[np.intp]
+BITS = 52  # of a word of which floats tell the highest
 
 
 def coloured(rows: Rows, n: int) -> Rows:
@@ -19,13 +20,15 @@ def coloured(rows: Rows, n: int) -> Rows:
     Notes
     -----
     Jones and Plassmann, A parallel graph coloring heuristic (1993): of the elements that have no colour yet, those that
-    come first at all their particles, by a hash of their number, take the one after the highest that is taken there.
+    come first at all their particles, by a hash of their number, take the lowest that is not taken there; beyond the
+    bits of a word, the one after the highest.
     """
     e = len(rows)
     rank = np.empty(e, np.int64)
     rank[np.argsort(_hash(e), kind="stable")] = np.arange(e)
     colour = np.zeros(e, np.intp)
-    free = np.zeros(n, np.intp)  # the first colour that is not taken at a particle
+    taken = np.zeros(n, np.uint64)  # colours at a particle, a bit for each
+    beyond = np.full(n, BITS)  # the first one that has no bit and is not taken
     waiting = np.arange(e)
     while len(waiting):
         mine, own = rows[waiting], rank[waiting]
@@ -33,9 +36,13 @@ def coloured(rows: Rows, n: int) -> Rows:
         np.minimum.at(first, mine.ravel(), np.repeat(own, rows.shape[1]))
         chosen = (first[mine] == own[:, None]).all(axis=1)
         some = mine[chosen]
-        found = free[some].max(axis=1)
+        used = np.bitwise_or.reduce(taken[some], axis=1)
+        lowest = ~used & (used + np.uint64(1))
+        few = used < np.uint64(2**BITS - 1)
+        found = np.where(few, np.log2(np.where(few, lowest, 1)).astype(np.intp), beyond[some].max(axis=1))
         colour[waiting[chosen]] = found
-        free[some] = found[:, None] + 1
+        taken[some] |= np.where(few, lowest, 0)[:, None]
+        beyond[some] = np.maximum(beyond[some], found[:, None] + 1)
         waiting = waiting[~chosen]
     return colour
 
