@@ -95,7 +95,7 @@ def stability(system: ParticleSystem, solver: Solver) -> Stability:
     return Stability(
         largest_safe_dt=limit,
         frequency=size,
-        damping_ratio=float(-np.real(fast) / size) if size > 0 else 0.0,
+        damping_ratio=float(0.0 - np.real(fast) / size) if size > 0 else 0.0,
         period=2 * math.pi / size if size > 0 else math.inf,
         solver=solver.name,
         elements=_elements(system, solver, matrix, limit),
@@ -112,7 +112,12 @@ def eigenvalues(system: ParticleSystem) -> Complex:
     InvalidInput
         The forces are not finite, or have no Jacobian, or the iteration does not converge.
     """
-    return _modes(system, _linearised(system)).values
+    return modes(system).values
+
+
+def modes(system: ParticleSystem) -> Modes:
+    """The motions whose eigenvalues `eigenvalues` gives."""
+    return _modes(system, _linearised(system))
 
 
 class Modes(NamedTuple):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,6 +13,7 @@ import numpy as np
 
 from pointmass.cli.options import RunOptions, as_json, load_scene, run_options
 from pointmass.cli.report import finite
+from pointmass.errors import InvalidInput
 from pointmass.forces.gravity import Gravity
 from pointmass.laws.elements import ElementForce
 from pointmass.stability import stability
@@ -29,16 +31,21 @@ SENSIBLE = 200  # substeps in a frame, beyond which an implicit solver is cheape
 
 @click.command("check")
 @click.argument("scene")
+@click.option("--picture", help="Draw it too: eigenvalues in the solver's plane, springs coloured (a .png).")
 @run_options
 @as_json
-def command(scene: str, as_json: bool, **values: Any) -> None:
+def command(scene: str, picture: str | None, as_json: bool, **values: Any) -> None:
     """Say whether the step of SCENE is small enough, from its stiffest motion and the solver's limits.
 
     For springs, joints and other elements it says how near each family is to the limit, alone and with what its
     neighbours add, and which of them carry the motion that limits the step.
     """
     loaded = load_scene(scene, RunOptions(**values))
+    if picture is not None:
+        _check_picture(Path(picture))
     simulation, found, counts = at_start(loaded)
+    if picture is not None:
+        _draw(Path(picture), simulation, found, loaded)
     result = report(loaded, simulation, found, counts)
     click.echo(json.dumps(result, allow_nan=False) if as_json else _text(result, found))
 
@@ -52,6 +59,26 @@ def at_start(scene: Scene) -> tuple[Simulation, Stability, dict[str, int]]:
     counts |= {"forces": len(system.forces), "emitters": len(simulation.emitters)}
     _add_first_births(simulation, math.ceil((scene.frames - 1) / scene.fps / simulation.dt))
     return simulation, stability(system, simulation.solver), counts
+
+
+def _check_picture(path: Path) -> None:
+    """Refuse what cannot be written before anything is computed."""
+    from pointmass.render import check_write
+    from pointmass.render.film import is_single
+
+    if not is_single(path):
+        raise InvalidInput(f"--picture {str(path)!r} is not allowed: it is one picture, such as stability.png")
+    check_write(path)
+
+
+def _draw(path: Path, simulation: Simulation, found: Stability, scene: Scene) -> None:
+    from PIL import Image
+
+    from pointmass.cli.compiling import compiling_said
+    from pointmass.stability_picture import stability_picture
+
+    with compiling_said(quiet=False):
+        Image.fromarray(stability_picture(simulation, found, scene.camera)).save(path, format="PNG")
 
 
 def report(scene: Scene, simulation: Simulation, found: Stability, counts: dict[str, int]) -> dict[str, Any]:
