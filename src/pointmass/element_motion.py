@@ -114,13 +114,20 @@ class ElementBlocks(NamedTuple):
         return np.asarray((blocks * u[:, :, :, None, None] * u[:, None, None]).sum(axis=(1, 2, 3, 4)))
 
 
+def element_forces(system: ParticleSystem) -> Iterator[ElementForce]:
+    """The forces on elements that act now."""
+    for force in system.forces:
+        if isinstance(force, ElementForce) and force.enabled and len(force.ids):
+            yield force
+
+
 def element_blocks(system: ParticleSystem) -> list[ElementBlocks]:
     """Of all forces on elements that act now."""
     p = system.particles
     x, v = bent(system).astype(np.float64), p.v.astype(np.float64)
     weight = np.sqrt(np.where(p.pinned, 0.0, p.w.astype(np.float64)))
     result = []
-    for force in _forces(system):
+    for force in element_forces(system):
         rows = force.rows(p)
         dx, dv = (_symmetric(-d) for d in force.element_jacobians(p, system.t, x, v))
         result.append(ElementBlocks(force, rows, weight[rows], dx, dv))
@@ -135,7 +142,7 @@ def bent(system: ParticleSystem) -> Array:
     """
     p = system.particles
     size = np.full(len(p), np.inf)
-    for force in _forces(system):
+    for force in element_forces(system):
         if force.nodes > 2:
             rows = force.rows(p)
             edges = np.linalg.norm(np.diff(p.x[rows].astype(np.float64), axis=1), axis=2)
@@ -244,12 +251,6 @@ def _sums(blocks: Sequence[ElementBlocks], count: int, name: str) -> Array:
                     total[:, i, j] += np.bincount(each.rows[:, a], weight * matrices[:, a, i, a, j], count)
     largest: Array = np.linalg.eigvalsh(total)[:, -1]  # of lower triangles
     return largest
-
-
-def _forces(system: ParticleSystem) -> Iterator[ElementForce]:
-    for force in system.forces:
-        if isinstance(force, ElementForce) and force.enabled and len(force.ids):
-            yield force
 
 
 def _symmetric(blocks: Array) -> Array:

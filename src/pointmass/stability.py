@@ -168,8 +168,8 @@ def _elements(system: ParticleSystem, solver: Solver, matrix: Any, limit: float)
     motions = [_strongest(part, islands) for part in (pull, damping)]
     stiffness, drags = ([float(x @ (part @ x)) for x in motions] for part in (pull, damping))
     by_drag = bool(np.argmin(largest_safe_steps(solver, stiffness, drags)))
-    energy = (drags if by_drag else stiffness)[by_drag]
-    vector = motions[by_drag] / math.sqrt(energy) if energy > 0.0 else np.zeros(3 * n)
+    energy = (drags if by_drag else stiffness)[int(by_drag)]
+    vector = motions[int(by_drag)] / math.sqrt(energy) if energy > 0.0 else np.zeros(3 * n)
     return element_motions(blocks, n, solver, limit, vector, by_drag)
 
 

@@ -249,6 +249,21 @@ def test_check_says_what_is_safe(folder: Path) -> None:
     assert "amplifies this motion at any dt" in pointmass("check", "orbit", "--solver", "euler").stdout
 
 
+def test_a_run_with_too_long_a_step_says_so_in_one_line_and_runs(folder: Path) -> None:
+    (folder / "stiff.toml").write_text(BURSTING.replace("euler", "leapfrog").replace("1e5", "30000.0"))
+    arguments = ["run", "stiff.toml", "-o", "s.zarr", "--frames", "2"]
+    done = pointmass(*arguments)
+    assert done.exit_code == 0
+    lines = [line for line in done.stderr.splitlines() if "too long" in line]
+    assert lines == [
+        "pointmass: dt = 0.01 s is too long for leapfrog: spring 0 (particles 0-1) takes part in a motion with "
+        "omega dt = 2.45, and the limit is 2; the largest safe dt is about 0.00816 s: use a smaller dt, more substeps "
+        "or implicit_euler"
+    ]
+    assert pointmass(*arguments, "--quiet").stderr == ""
+    assert "too long" not in pointmass(*arguments, "--dt", "0.008").stderr
+
+
 def test_check_says_which_springs_are_nearest_to_the_limit(folder: Path) -> None:
     """Two masses of 0.5 kg on a spring of 100 N/m: w = 20, and of leapfrog's limit 2 a step of 0.05 takes a half."""
     (folder / "two.toml").write_text(

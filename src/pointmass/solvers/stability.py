@@ -100,6 +100,12 @@ def largest_safe_steps(solver: Solver, stiffness: ArrayLike, damping: ArrayLike)
     return result
 
 
+def grows(solver: Solver, stiffness: ArrayLike, damping: ArrayLike, h: ArrayLike) -> NDArray[np.bool_]:
+    """Whether steps of h amplify modes that do not grow by themselves, see `largest_safe_steps`; shape (k,)."""
+    pull, drag, length = np.broadcast_arrays(np.maximum(stiffness, 0.0), np.maximum(damping, 0.0), h)
+    return _grows(solver, pull.astype(complex), drag.astype(complex), length.astype(np.float64))
+
+
 def safe_step(solver: Solver, matrix: Any, h: float, growth: float) -> float:
     """A step up to h with which a solver keeps all of dy/dt = matrix y in bounds.
 
