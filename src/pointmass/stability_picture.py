@@ -33,7 +33,8 @@ ASIDE = 0.76  # of the plane's width is where motions decay
 ROOM = 1.12
 COARSE = 2  # pixels between two places where the solver is tried
 FINE = 3  # times finer than a pixel lines are drawn
-DOT = 4.5  # radius of an eigenvalue [pixels]
+DOT, SMALL_DOT = 4.5, 3.2  # radius of an eigenvalue [pixels], and where there are many
+MANY = 200
 ALMOST = 1e-9  # growth in a step that is round-off
 
 BACK, PANEL, RULE, INK, FAINT = (10, 13, 20), (16, 21, 31), (52, 62, 80), (226, 232, 240), (148, 160, 178)
@@ -168,9 +169,10 @@ def _plane(simulation: Simulation, plane: Plane, motions: Modes) -> Picture:
     draw.line((0, y, fine.width, y), RULE, FINE)
     draw.line((x, 0, x, fine.height), RULE, FINE)
     grows = _amplified(simulation, motions)
+    dot = DOT if len(grows) < MANY else SMALL_DOT
     for number, bad in sorted(zip(motions.values * simulation.dt, grows, strict=True), key=lambda pair: bool(pair[1])):
         middle = [FINE * (a - b) for a, b in zip(plane.pixel(complex(number)), (left, top), strict=True)]
-        for radius, ink in ((DOT + 1.5, BACK), (DOT, ALARM if bad else CALM)):
+        for radius, ink in ((dot + 1.2, BACK), (dot, ALARM if bad else CALM)):
             reach = FINE * radius
             draw.ellipse((middle[0] - reach, middle[1] - reach, middle[0] + reach, middle[1] + reach), ink)
     return fine.resize(size, Image.Resampling.LANCZOS)
