@@ -25,7 +25,7 @@ ACCURACY = 1e-9
 STANDING = 1e-6  # of the fastest motion: slower ones are round-off of those that stand still, double eigenvalues
 SMALL = 200  # dimension up to which all motions are found to get one
 VECTOR = 1e-6  # accuracy of the motion that elements carry
-NOTHING = 1e-3  # of a motion's energy: who has less is not named
+NOTHING = 1e-3  # of what the first one carries: who has less is not named
 ITERATION: dict[str, Any] = {"ncv": 80, "maxiter": 100, "tol": ACCURACY}
 
 
@@ -55,7 +55,8 @@ class Stability:
         """The elements with most of the energy of the motion that limits the step, at most `count` of them."""
         most = [(table, np.argsort(-table.part, kind="stable")[:count]) for table in self.elements]
         found = [table.element(int(number)) for table, numbers in most for number in numbers]
-        return sorted((e for e in found if e.part > NOTHING), key=lambda e: -e.part)[:count]
+        found.sort(key=lambda e: -e.part)
+        return [e for e in found[:count] if e.part > max(0.0, NOTHING * found[0].part)]
 
     def __str__(self) -> str:
         step = "any" if math.isinf(self.largest_safe_dt) else f"{self.largest_safe_dt:.4g} s"

@@ -285,12 +285,12 @@ def test_check_says_which_springs_are_nearest_to_the_limit(folder: Path) -> None
     assert (other["omega_dt"], other["share"], other["damping_ratio"]) == (pytest.approx(0.5), pytest.approx(0.25), 0)
     (carrier,) = result["carriers"]
     assert (carrier["name"], carrier["particles"]) == ("spring 0 of family shear (particles 0-1)", [0, 1])
-    assert carrier["part"] == pytest.approx(1.0)
+    assert carrier["part"] == shear["part"] == pytest.approx(1.0)
     assert (result["recommended_dt"], result["recommended_substeps"], result["safe"]) == (0.095, 1, True)
     text = pointmass("check", "two.toml").stdout
     assert re.search(r"carried by +spring 0 of family shear \(particles 0-1\): 100 % of its energy", text)
-    assert re.search(r"elements +family +count +omega dt +damping +alone +together\n", text)
-    assert re.search(r"shear +1 +1 +0 +50 % +50 %\n", text)
+    assert re.search(r"elements +family +count +omega dt +damping +alone +together +carries\n", text)
+    assert re.search(r"shear +1 +1 +0 +50 % +50 % +100 %\n", text)
     assert "warning          gravity acts, but nothing is pinned and there is no floor" in text
     stiff = ["check", "two.toml", "--set", "forces.1.k_s=1e9"]
     assert "would need 556 substeps in each frame; use --solver implicit_euler" in pointmass(*stiff).stdout

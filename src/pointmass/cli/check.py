@@ -120,7 +120,8 @@ def _families(found: Stability, dt: float) -> list[dict[str, Any]]:
         worst = int(np.lexsort((speed, together))[-1])
         row = {"force": force, "family": family, "count": len(speed), "omega_dt": float(speed.max() * dt)}
         row |= {"damping_ratio": finite(float(ratio[worst]))}
-        rows.append((float(together.max()), row | {"share": finite(float(alone.max()))}))
+        row |= {"share": finite(float(alone.max())), "part": float(sum(t.part.sum() for t in group))}
+        rows.append((float(together.max()), row))
     rows.sort(key=lambda row: -row[0])
     return [row | {"share_together": finite(together)} for together, row in rows]
 
@@ -180,15 +181,17 @@ def _table(families: list[dict[str, Any]]) -> list[str]:
     if not families:
         return []
     wide = max(8, *(len(row["family"]) for row in families[:FAMILIES]))
-    rows = [f"{'family':<{wide}} {'count':>8} {'omega dt':>9} {'damping':>8} {'alone':>7} {'together':>9}"]
+    rows = [
+        f"{'family':<{wide}} {'count':>8} {'omega dt':>9} {'damping':>8} {'alone':>7} {'together':>9} {'carries':>8}"
+    ]
     for row in families[:FAMILIES]:
         ratio = "inf" if row["damping_ratio"] is None else f"{row['damping_ratio']:.3g}"
         alone, together = ("any" if row[k] is None else f"{100 * row[k]:.0f} %" for k in ("share", "share_together"))
         number = f"{row['family']:<{wide}} {row['count']:>8} {row['omega_dt']:>9.3g} {ratio:>8}"
-        rows.append(f"{number} {alone:>7} {together:>9}")
+        rows.append(f"{number} {alone:>7} {together:>9} {100 * row['part']:>6.3g} %")
     if len(families) > FAMILIES:
         rows.append(f"and {len(families) - FAMILIES} more")
-    return [*rows, "(alone and together with its neighbours: of the largest safe dt, 100 % = at the edge)"]
+    return [*rows, "(alone, together with neighbours: of the largest safe dt; carries: of the fastest motion's energy)"]
 
 
 def _largest(result: dict[str, Any]) -> str:
