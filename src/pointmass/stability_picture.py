@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pointmass.colors import linear
 from pointmass.frame import Camera, Drawable, Frame, Points, Segments
 from pointmass.render import fit_camera, image
-from pointmass.solvers.stability import amplification
+from pointmass.solvers.stability import amplification, amplification_of_modes
 from pointmass.stability import Modes, Stability, modes
 
 if TYPE_CHECKING:
@@ -35,7 +35,8 @@ COARSE = 2  # pixels between two places where the solver is tried
 FINE = 3  # times finer than a pixel lines are drawn
 DOT, SMALL_DOT = 4.5, 3.2  # radius of an eigenvalue [pixels], and where there are many
 MANY = 200
-ALMOST = 1e-9  # growth in a step that is round-off
+ALMOST, ROUNDING = 1e-9, 1e-8  # growth in a step that is round-off, of the region and of a motion
+TINY = 1e-300
 
 BACK, PANEL, RULE, INK, FAINT = (10, 13, 20), (16, 21, 31), (52, 62, 80), (226, 232, 240), (148, 160, 178)
 INSIDE, EDGE, CALM, ALARM = (30, 74, 104), (118, 200, 240), (255, 226, 140), (255, 84, 84)
@@ -113,7 +114,8 @@ def stability_picture(simulation: Simulation, found: Stability, camera: Camera |
         shown = image(frame, camera=fit_camera([frame], camera, (width, height)), size=(width, height))
         picture.paste(Image.fromarray(shown), SCENE[:2])
     draw = ImageDraw.Draw(picture)
-    _scale(picture, draw)
+    if found.elements:
+        _scale(picture, draw)
     _words(draw, plane, simulation, found)
     return np.asarray(picture)
 
@@ -203,16 +205,11 @@ def _growth(simulation: Simulation, plane: Plane) -> Array:
 
 def _amplified(simulation: Simulation, motions: Modes) -> NDArray[np.bool_]:
     """Which motions a step of the simulation makes larger that do not grow by themselves."""
-    z = motions.values * simulation.dt
-    speed = np.maximum(np.abs(z), 1e-30)
-    own = np.maximum(z.real, 0.0)
-    pull, drag = motions.stiffness.real, motions.damping.real
-    omega = np.sqrt(np.maximum(pull, 0.0))
-    zeta = np.where(omega > 0.0, 0.5 * drag / np.where(omega > 0.0, omega, 1.0), 0.0)
-    factor = amplification(simulation.solver, omega, zeta, simulation.dt)
-    alone = amplification(simulation.solver, speed, np.clip(-z.real / speed, -1.0, 1.0), 1.0)
-    largest = np.where(omega > 0.0, factor, alone)
-    return np.asarray(~(np.log(np.maximum(largest, 1e-300)) <= own + 1e-8))
+    stiffness, damping = motions.stiffness, motions.damping
+    middle, gap = -0.5 * damping, np.sqrt(0.25 * damping * damping - stiffness)
+    own = np.maximum(np.maximum((middle + gap).real, (middle - gap).real), 0.0) * simulation.dt
+    factor = amplification_of_modes(simulation.solver, stiffness, damping, simulation.dt)
+    return np.asarray(~(np.log(np.maximum(factor, TINY)) <= own + ROUNDING))
 
 
 def _scale(picture: Picture, draw: Any) -> None:
@@ -243,7 +240,8 @@ def _words(draw: Any, plane: Plane, simulation: Simulation, found: Stability) ->
     verdict = f"{'safe' if safe else 'not safe'}: largest safe dt {limit}"
     draw.text((SCENE[2], 30), verdict, EDGE if safe else ALARM, _font(26), "rm")
     draw.text((left, 70), "eigenvalues times dt, and where a step keeps them in bounds", FAINT, _font(17), "lm")
-    draw.text((SCENE[0], 70), "share of the limit, with what the neighbours add", FAINT, _font(17), "lm")
+    colors = "share of the limit, with what the neighbours add" if found.elements else "the start; nothing is linked"
+    draw.text((SCENE[0], 70), colors, FAINT, _font(17), "lm")
     step = _nice(0.5 * (bottom - top) / plane.scale / 3)
     for k in range(-40, 41):
         x, y = plane.pixel(complex(k * step, 0.0))[0], plane.pixel(complex(0.0, k * step))[1]

@@ -46,6 +46,11 @@ def amplification(solver: Solver | type[Solver], omega: ArrayLike, zeta: ArrayLi
     return _amplification(solver, stiffness.ravel(), damping.ravel(), h.ravel()).reshape(h.shape)[()]
 
 
+def amplification_of_modes(solver: Solver, stiffness: Complex, damping: Complex, h: float) -> Array:
+    """Likewise for modes x'' = -stiffness x - damping x', complex where forces turn; shape (k,)."""
+    return _amplification(solver, stiffness, damping, np.full(len(stiffness), h))
+
+
 def largest_safe_step(solver: Solver, stiffness: ArrayLike, damping: ArrayLike) -> float:
     """The largest h such that no step in (0, h] amplifies a mode x'' = -stiffness x - damping x'.
 
