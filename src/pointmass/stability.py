@@ -24,7 +24,7 @@ WANTED = 4  # eigenvalues of each kind in larger systems
 ACCURACY = 1e-9
 STANDING = 1e-6  # of the fastest motion: slower ones are round-off of those that stand still, double eigenvalues
 SMALL = 200  # dimension up to which all motions are found to get one
-VECTOR = 1e-6  # accuracy of the motion that elements carry
+VECTOR = 1e-4  # residual of the motion that elements carry: their energies are off by its square
 NOTHING = 1e-3  # of what the first one carries: who has less is not named
 ITERATION: dict[str, Any] = {"ncv": 80, "maxiter": 100, "tol": ACCURACY}
 
