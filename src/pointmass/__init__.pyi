@@ -283,6 +283,9 @@ from .solvers import (
     SOLVERS as SOLVERS,
 )
 from .solvers import (
+    XPBD as XPBD,
+)
+from .solvers import (
     BogackiShampine as BogackiShampine,
 )
 from .solvers import (

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -14,6 +15,7 @@ from pointmass.collisions.collider import Collider
 from pointmass.errors import InvalidInput, about
 from pointmass.laws.elements import ConstraintForce
 from pointmass.laws.force import Blocks, Force, block_matrix
+from pointmass.laws.relaxation import relax
 from pointmass.particles import Array, Particles, Selection
 from pointmass.solvers.base import Solver
 from pointmass.solvers.registry import as_solver
@@ -208,6 +210,42 @@ class ParticleSystem:
         moves = diags_array(np.repeat(np.where(p.pinned, 0.0, 1.0), 3))
         return csr_array(block_array([[None, moves], [pull, damp]]))
 
+    def external(self, t: Any, y: Array) -> Array:
+        """dy/dt without the elements that `relaxed` stands for: springs, angles and the like."""
+        with self.slack():
+            return self.deriv_eval(t, y)
+
+    @contextmanager
+    def slack(self) -> Iterator[None]:
+        """Inside, elements that `relaxed` stands for pull nobody."""
+        elastic = self._elastic()
+        for force in elastic:
+            force.enabled = False
+        try:
+            yield
+        finally:
+            for force in elastic:
+                force.enabled = True
+
+    def relaxed(self, t: Any, h: Array, x: Array, rise: Array, sweeps: int) -> Array:
+        """How far positions come in a step with elastic elements that are relaxed one by one.
+
+        Parameters
+        ----------
+        t, h : end and length of the step [s], numbers or shape (dim,).
+        x : positions at its start [m], shape (3n,).
+        rise : how far they come without the elements [m], shape (3n,).
+        sweeps : times that every element is looked at.
+        """
+        elastic, n = self._elastic(), len(self.particles)
+        if not elastic or not n:
+            return rise
+        project = None if self.filter is None else self.filter.projection(n).astype(self.particles.dtype)
+        length = np.broadcast_to(h, self.dim)[: 3 * n : 3]
+        result = rise.reshape(n, 3).copy()
+        relax(elastic, self.particles, self._particle_time(t), length, x.reshape(n, 3), result, sweeps, project)
+        return result.ravel()
+
     # ---------------------------------------------------------------------------------------- what users ask
 
     def energy(self, known: Mapping[Force, float] | None = None) -> Energy:
@@ -296,6 +334,10 @@ class ParticleSystem:
         return result
 
     # ---------------------------------------------------------------------------------------- inside
+
+    def _elastic(self) -> list[ConstraintForce]:
+        """Forces whose elements can be relaxed one by one."""
+        return [f for f in self.forces if f.enabled and isinstance(f, ConstraintForce)]
 
     def _common_order(self) -> int:
         orders = {force.order for force in self.forces}

@@ -19,6 +19,7 @@ from pointmass.cache.groups import packed, unpacked
 from pointmass.errors import Diverged, InvalidInput
 from pointmass.frame import Arrows, Camera, Curves, Drawable, Frame, Points, Segments, Triangles
 from pointmass.scenes import SCENES
+from tests.small import SMALL
 
 RNG = np.random.default_rng(0)
 
@@ -112,7 +113,7 @@ def test_a_recorded_scene_is_the_scene(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_frames_of_shipped_scenes_are_those_that_were_seen(tmp_path: Path, name: str) -> None:
-    scene = SCENES[name]().build()
+    scene = SCENES[name].with_settings(SMALL.get(name, {})).build()
     cache = record(scene.simulation(), tmp_path / "s.zarr", 4, 30, scene=scene)
     for live, stored in zip(scene.simulation().frames(4, 30), cache, strict=True):
         assert_same_frame(live, stored)

@@ -10,17 +10,8 @@ from pointmass.frame import Frame
 from pointmass.scene import Scene
 from pointmass.scenes import SCENES, CheckFailed
 from pointmass.scenes.base import ShippedScene
+from tests.small import SMALL
 
-SMALL = {  # fewer particles where the default takes long; the physics is the same
-    "flow": {"particles": 200, "arrows": 6, "streamlines": 6},
-    "springs": {"side": 4},
-    "fountain": {"rate": 200},
-    "fireworks": {"height": 8.0, "stars": 40, "launches": 4.0, "smoke": 3, "tail": 20.0},
-    "snow": {"rate": 60.0},
-    "smoke": {"rate": 60.0},
-    "bounce": {"balls": 20},
-    "dust": {"sand": 400, "dust": 60.0},
-}
 VARIANTS = [(name, SMALL.get(name, {})) for name in SCENES] + [
     ("orbit", {"kind": "kepler"}),
     ("flow", {"particles": 200, "sway": 0.0, "arrows": 0, "streamlines": 0}),

@@ -76,7 +76,7 @@ def test_solver_under_force_family(solver: str, family: str) -> None:
 @pytest.mark.parametrize("family", FIRST_ORDER)
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_solver_under_flow(solver: str, family: str) -> None:
-    if solver in ("symplectic_euler", "leapfrog", "yoshida4"):
+    if solver in ("symplectic_euler", "leapfrog", "yoshida4", "xpbd"):
         with pytest.raises(InvalidInput, match=solver):
             error_of(solver, FIRST_ORDER[family], DT)
         return

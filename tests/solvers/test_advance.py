@@ -289,7 +289,7 @@ def test_splitting_does_not_drift_what_the_system_holds(name):
 def test_names():
     assert list(SOLVERS) == [
         *("euler", "symplectic_euler", "midpoint", "heun", "rk4", "leapfrog", "yoshida4", "bs32", "dopri5"),
-        *("implicit_euler", "implicit_midpoint", "bdf2"),
+        *("implicit_euler", "implicit_midpoint", "bdf2", "xpbd"),
     ]
     assert find_solver("Backward-Euler") is SOLVERS["implicit_euler"]
     assert all(find_solver(alias).name == name for alias, name in ALIASES.items())

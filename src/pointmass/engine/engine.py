@@ -38,6 +38,7 @@ from pointmass.solvers.control import control_of
 from pointmass.solvers.explicit import ExplicitRungeKutta
 from pointmass.solvers.implicit import Implicit
 from pointmass.solvers.splitting import Splitting
+from pointmass.solvers.xpbd import XPBD
 from pointmass.system import ParticleSystem
 
 Rows = NDArray[np.intp]
@@ -115,14 +116,16 @@ class Engine:
     @property
     def compiled(self) -> bool:
         """Whether kernels exist for all that the system is made of now."""
-        fits = self.system.order == 2 or not isinstance(self.solver, Splitting)  # else the solver says what is wrong
+        fits = self.system.order == 2 or not isinstance(
+            self.solver, (Splitting, XPBD)
+        )  # else the solver says what is wrong
         return self.wanted and fits and len(self.system.particles) > 0 and not self.missing()
 
     def missing(self) -> list[str]:
         """What of the system has no kernel, and what would have: a sentence each."""
         found = []
         for force in self.system.forces:
-            if isinstance(force, PairForce) and self.solver.implicit:
+            if isinstance(force, PairForce) and isinstance(self.solver, Implicit):
                 found.append(f"pairs such as {force.called} have no kernel under {self.solver.name}: use leapfrog")
             elif not isinstance(force, (UnaryForce, ElementForce, PairForce)):
                 found.append(
@@ -504,7 +507,7 @@ def _apart(islands: Rows) -> bool:
 
 
 def _has_step(solver: Solver) -> bool:
-    return isinstance(solver, (ExplicitRungeKutta, Splitting, Implicit))
+    return isinstance(solver, (ExplicitRungeKutta, Splitting, Implicit, XPBD))
 
 
 def _by_lanes(solver: Solver) -> bool:

@@ -23,7 +23,7 @@ from pointmass.engine.contact import ContactText
 from pointmass.engine.pairs import Pairs
 from pointmass.engine.printing import function, indented, literal
 from pointmass.engine.reference import surfaces_of
-from pointmass.laws.elements import ElementForce
+from pointmass.laws.elements import ConstraintForce, ElementForce
 from pointmass.laws.pairs import PairForce
 from pointmass.laws.unary import UnaryForce
 from pointmass.system import ParticleSystem
@@ -48,8 +48,8 @@ class Elements:
     Attributes
     ----------
     number : of the family; the arrays of the kernel are named after it: N (nodes), L (columns) and T (ranges), tile by
-        tile; for the blocks of implicit solvers also E (nodes) and D (columns), element by element, J and I
-        (incidence), B (buffer of forces), and s, e (its range in the island).
+        tile; for implicit solvers also E (nodes) and D (columns), element by element, J and I (incidence), B (buffer of
+        forces), and s, e (its range in the island); Z (colours) of elements that all threads relax.
     tiled, table : columns tile by tile, and element by element.
     """
 
@@ -58,11 +58,12 @@ class Elements:
     tiled: Table
     table: Table
     implicit: bool
+    coloured: bool
 
     @property
     def arguments(self) -> list[str]:
         """Arrays of the kernel."""
-        return [f"{name}{self.number}" for name in ("NLEDJI" if self.implicit else "NL")]
+        return [f"{name}{self.number}" for name in ("NLEDJI" if self.implicit else "NL") + "Z" * self.coloured]
 
     @property
     def locals(self) -> list[str]:
@@ -85,10 +86,11 @@ class Deriv:
     ----------
     parallel : whether its loops are those of all threads.
     implicit : whether resting contact is that of the start of a piece, and elements have blocks of a Jacobian.
+    relaxed : whether springs and the like act only where the local `elastic` says so: else the solver relaxes them.
     """
 
-    def __init__(self, system: ParticleSystem, parallel: bool, implicit: bool) -> None:
-        self.system, self.parallel, self.implicit = system, parallel, implicit
+    def __init__(self, system: ParticleSystem, parallel: bool, implicit: bool, relaxed: bool = False) -> None:
+        self.system, self.parallel, self.implicit, self.relaxed = system, parallel, implicit, relaxed
         self.contact: ContactText | None = None
         if system.colliders:
             self.contact = ContactText(surfaces_of(system), system.order, implicit, str(system.particles.dtype))
@@ -117,6 +119,7 @@ class Deriv:
             + [a for p in self.pairs for a in p.locals]
             + ["K"] * (self.contact is not None)
             + ["cuts", *self.scratch] * bool(self.families)
+            + ["elastic"] * self.relaxed
         )
         return ", ".join(["base", "n", *self.data, *own])
 
@@ -230,7 +233,9 @@ class Deriv:
         """Statements that go through the elements of a tile and add what they do to its particles."""
         j, nodes = len(self.families) + len(self.pairs), force.nodes
         table = Table(f"L{j}")
-        self.families.append(Elements(force, j, table, Table(f"D{j}"), self.implicit))
+        elastic = self.relaxed and isinstance(force, ConstraintForce)
+        coloured = elastic and self.parallel
+        self.families.append(Elements(force, j, table, Table(f"D{j}"), self.implicit, coloured))
         state = {"t": "R(t)"}
         for node in range(nodes):
             for k, q in enumerate("xv"):
@@ -267,7 +272,7 @@ class Deriv:
         ]
         return [
             f"# {force.name}",
-            f"if {self.binder.switch(force)} != 0:",
+            f"if {'elastic and ' * elastic}{self.binder.switch(force)} != 0:",
             f"    for first in range(T{j}[tile], T{j}[tile + 1], {LANES}):",
             f"        count = min({LANES}, T{j}[tile + 1] - first)",
             "        for lane in range(0, count - 7, 8):",

@@ -18,19 +18,22 @@ from pointmass.engine import store
 from pointmass.engine.adaptive import control_text
 from pointmass.engine.blocks import Kind, Layout, layout, slices
 from pointmass.engine.contact import ContactText
-from pointmass.engine.forces import LANES, Deriv, Incidence, incidence, tiled
+from pointmass.engine.forces import LANES, Deriv, Elements, Incidence, incidence, tiled
 from pointmass.engine.impacts import WORK, ImpactText
 from pointmass.engine.implicit import implicit_text
 from pointmass.engine.pairs import FULL, PairArrays
 from pointmass.engine.phases import REACHED
 from pointmass.engine.printing import function, indented
 from pointmass.engine.reference import KILLED
+from pointmass.engine.relaxation import relaxation_text
 from pointmass.engine.steps import StepText, each, step_text
 from pointmass.engine.threads import spread
+from pointmass.laws.elements import ConstraintForce
 from pointmass.solvers.advance import NEARLY, SET_BACKS, Stats
 from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.control import control_of
 from pointmass.solvers.implicit import Implicit
+from pointmass.solvers.xpbd import XPBD
 from pointmass.system import ParticleSystem
 
 CHECKPOINT = 64  # steps after which nothing is remembered of earlier ones but the state, so that a run can go on there
@@ -108,7 +111,7 @@ class IslandKernel:
         self.system, self.solver = system, solver
         self._watched = watched
         self.dtype = str(system.particles.dtype)
-        self.deriv = Deriv(system, parallel, solver.implicit)
+        self.deriv = Deriv(system, parallel, solver.implicit, isinstance(solver, XPBD))
         self.impacts = self._impacts()
         self.step = self._step_text()
         self.text = REACHED + self.functions_text + self._run()
@@ -123,6 +126,8 @@ class IslandKernel:
     def _step_text(self) -> StepText:
         if isinstance(self.solver, Implicit):
             return implicit_text(self.deriv, self.solver)
+        if isinstance(self.solver, XPBD):
+            return relaxation_text(self.deriv, self.solver)
         depends = self.system.velocity_dependent
         order, loop = self.system.order, self.deriv.loop
         steady = all(force.steady for force in self.system.forces)
@@ -324,6 +329,7 @@ class IslandKernel:
             "control = controls[island]",
             "done = work[island]",
             *["known[0] = 0"] * self.step.keeps,
+            *["elastic = True"] * deriv.relaxed,
             "bad = 0",
             *dead,
             "for s in range(count):",
@@ -397,7 +403,9 @@ class IslandMembers:
         self.order = None if everybody(rows, len(self.place)) else rows
         self.pairs = [PairArrays(p, kernel.system.particles, self.place) for p in kernel.deriv.pairs]
         elements = [self._elements(f.force) for f in kernel.deriv.families]
-        self.families = [self._family(*each) for each in elements] if kernel.deriv.implicit else []
+        self.families = []
+        if kernel.deriv.implicit:
+            self.families = [self._family(f, *e) for f, e in zip(kernel.deriv.families, elements, strict=True)]
         places = [self.place[nodes] for _, nodes in elements]
         self.tiling = self._tiling(places) if kernel.deriv.parallel else self.first
         first = 0 * self.tiling[:-1] if kernel.deriv.parallel else self.first[:-1]
@@ -415,10 +423,19 @@ class IslandMembers:
         mine = np.flatnonzero(self.place[nodes[:, 0]] >= 0)
         return mine, nodes[mine]
 
-    def _family(self, mine: Rows, nodes: Rows) -> tuple[Rows, Incidence]:
-        """Elements in the order of the kernel, and where they are."""
+    def _family(self, family: Elements, mine: Rows, nodes: Rows) -> tuple[Rows, Incidence]:
+        """Elements in the order of the kernel, by colour where they are relaxed, and where they are."""
+        if self.kernel.deriv.relaxed and isinstance(family.force, ConstraintForce):
+            by_colour = np.argsort(family.force.colours(self.kernel.system.particles)[mine], kind="stable")
+            mine, nodes = mine[by_colour], nodes[by_colour]
         found = incidence(self.place[nodes], self.first)
         return mine[found.order], found
+
+    def _colours(self, family: Elements, elements: Rows) -> Rows:
+        """Where each colour begins among elements in the order of their colours, and the end."""
+        assert isinstance(family.force, ConstraintForce)
+        colours = family.force.colours(self.kernel.system.particles)[elements]
+        return np.searchsorted(colours, np.arange(colours.max(initial=-1) + 2))
 
     def _layout(self, kind: Kind) -> Layout:
         """Where the blocks of a matrix are."""
@@ -453,6 +470,7 @@ class IslandMembers:
             if deriv.implicit:
                 elements, found = self.families[k]
                 data += [found.nodes, family.table.array(len(elements), dtype, elements), found.ends, found.entries]
+                data += [self._colours(family, elements)] * family.coloured
                 starts.append(found.start)
                 most.append(int(np.diff(found.start).max(initial=0)))
         for pairs in self.pairs:

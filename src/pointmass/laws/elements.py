@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pointmass.errors import InvalidInput, whole_number
+from pointmass.laws.colouring import coloured
 from pointmass.laws.force import Array, Blocks, Force, Rows, clock, inputs_for, matrix
 from pointmass.laws.parameter import Parameter
 from pointmass.laws.unary import law_name, law_parameters, origin, parameters_from
@@ -204,6 +205,8 @@ class ConstraintForce(ElementForce):
     named k_s, k_d and rest.
     """
 
+    _colours: tuple[Rows, Rows] | None = None
+
     @staticmethod
     @abstractmethod
     def constraint(*x: Any) -> Any:
@@ -229,6 +232,25 @@ class ConstraintForce(ElementForce):
             return 0.5 * k_s * (self.constraint(*x) - rest) ** 2
 
         return energy
+
+    @cached_property
+    def traced_constraint(self) -> Traced:
+        """C - rest, k_s, k_d, dC/dx1, ..., dC/dxk as a program."""
+        kept = {n: k for n, k in self._signature().items() if not n.startswith("v")}
+
+        def parts(*arguments: Any) -> Any:
+            *x, _t, k_s, k_d, rest = arguments
+            c = self.constraint(*x)
+            return [c - rest, k_s, k_d, *(gradient(c, node) for node in x)]
+
+        return trace(parts, kept, 3 + 3 * self.nodes, f"{self.name} constraint")
+
+    def colours(self, particles: Particles) -> Rows:
+        """Numbers of the elements, different for those that share a particle (see `coloured`), shape (e,)."""
+        rows = self.rows(particles)
+        if self._colours is None or self._colours[0] is not rows:
+            self._colours = rows, coloured(rows, len(particles))
+        return self._colours[1]
 
     def values(self, particles: Particles, x: Array) -> Array:
         """C of each element, shape (e,)."""

@@ -24,6 +24,7 @@ from pointmass.solvers.rk4 import RK4
 from pointmass.solvers.splitting import Splitting, Substep
 from pointmass.solvers.stability import amplification, largest_safe_step, largest_safe_steps
 from pointmass.solvers.symplectic_euler import SymplecticEuler
+from pointmass.solvers.xpbd import XPBD
 from pointmass.solvers.yoshida4 import Yoshida4
 
 __all__ = [
@@ -31,6 +32,7 @@ __all__ = [
     "BDF2",
     "RK4",
     "SOLVERS",
+    "XPBD",
     "BogackiShampine",
     "DormandPrince",
     "EmbeddedRungeKutta",

@@ -234,3 +234,10 @@ class _Counted:
 
     def jacobian(self, t: Clock, y: Array) -> Any:
         return self._system.jacobian(t, y)
+
+    def external(self, t: Clock, y: Array) -> Array:
+        self.evaluations += 1
+        return self._system.external(t, y)
+
+    def relaxed(self, t: Clock, h: Array, x: Array, rise: Array, sweeps: int) -> Array:
+        return self._system.relaxed(t, h, x, rise, sweeps)

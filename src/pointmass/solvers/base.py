@@ -54,6 +54,20 @@ class System(Protocol):
     def jacobian(self, t: Clock, y: Array) -> Any:
         """d(deriv_eval)/dy, a scipy.sparse CSR array of shape (dim, dim)."""
 
+    def external(self, t: Clock, y: Array) -> Array:
+        """dy/dt without the elements that `relaxed` stands for, shape (dim,)."""
+
+    def relaxed(self, t: Clock, h: Array, x: Array, rise: Array, sweeps: int) -> Array:
+        """How far positions come in a step with elements that are relaxed one by one (order 2).
+
+        Parameters
+        ----------
+        t, h : end and length of the step, each a number or of shape (dim,).
+        x : positions at its start, shape (dim // 2,).
+        rise : how far they come without the elements.
+        sweeps : times that every element is looked at.
+        """
+
 
 @dataclass(frozen=True, eq=False)
 class Step:
@@ -89,12 +103,15 @@ class Solver(Described, ABC):
     name : as in scene files and on the command line.
     order : of convergence.
     evaluations : of deriv_eval for one step (implicit methods: at least).
+    implicit : whether resting contact is that of the start of a step.
+    relaxes : whether it asks for `System.external` and `relaxed` instead of `deriv_eval`.
     """
 
     name: ClassVar[str]
     order: ClassVar[int]
     evaluations: ClassVar[int]
     implicit: ClassVar[bool] = False
+    relaxes: ClassVar[bool] = False
 
     @abstractmethod
     def step(self, system: System, t: Clock, y: Array, h: Clock, memory: Memory) -> Step:

@@ -71,6 +71,14 @@ class FunctionSystem:
 
         return sparse.csr_array(self._differences(t, y) if self._jacobian is None else self._jacobian(t, y))
 
+    def external(self, t: Clock, y: Array) -> Array:
+        """dy/dt: a function has no elements that could be relaxed."""
+        return self.deriv_eval(t, y)
+
+    def relaxed(self, t: Clock, h: Array, x: Array, rise: Array, sweeps: int) -> Array:
+        """`rise`."""
+        return rise
+
     def _differences(self, t: Clock, y: Array) -> Array:
         columns = []
         for i in range(self.dim):

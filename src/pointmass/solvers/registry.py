@@ -17,6 +17,7 @@ from pointmass.solvers.leapfrog import Leapfrog
 from pointmass.solvers.midpoint import Midpoint
 from pointmass.solvers.rk4 import RK4
 from pointmass.solvers.symplectic_euler import SymplecticEuler
+from pointmass.solvers.xpbd import XPBD
 from pointmass.solvers.yoshida4 import Yoshida4
 
 SOLVERS: dict[str, type[Solver]] = {
@@ -34,6 +35,7 @@ SOLVERS: dict[str, type[Solver]] = {
         ImplicitEuler,
         ImplicitMidpoint,
         BDF2,
+        XPBD,
     )
 }
 

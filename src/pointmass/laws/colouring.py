@@ -1,0 +1,48 @@
+"""Elements sorted into colours: those of one colour share no particle, and can be looked at in any order."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Rows = NDArray[np.intp]
+
+
+def coloured(rows: Rows, n: int) -> Rows:
+    """The colour of each element, counted from 0, shape (e,).
+
+    Parameters
+    ----------
+    rows : particles of each element, shape (e, k).
+    n : number of particles.
+
+    Notes
+    -----
+    Jones and Plassmann, A parallel graph coloring heuristic (1993): of the elements that have no colour yet, those that
+    come first at all their particles, by a hash of their number, take the one after the highest that is taken there.
+    """
+    e = len(rows)
+    rank = np.empty(e, np.int64)
+    rank[np.argsort(_hash(e), kind="stable")] = np.arange(e)
+    colour = np.zeros(e, np.intp)
+    free = np.zeros(n, np.intp)  # the first colour that is not taken at a particle
+    waiting = np.arange(e)
+    while len(waiting):
+        mine, own = rows[waiting], rank[waiting]
+        first = np.full(n, e)
+        np.minimum.at(first, mine.ravel(), np.repeat(own, rows.shape[1]))
+        chosen = (first[mine] == own[:, None]).all(axis=1)
+        some = mine[chosen]
+        found = free[some].max(axis=1)
+        colour[waiting[chosen]] = found
+        free[some] = found[:, None] + 1
+        waiting = waiting[~chosen]
+    return colour
+
+
+def _hash(count: int) -> NDArray[np.uint64]:
+    """Scrambled whole numbers (Vigna, splitmix64, 2015)."""
+    z = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return z ^ (z >> np.uint64(31))
