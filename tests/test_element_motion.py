@@ -139,6 +139,23 @@ def test_solvers_that_take_any_step_or_none(solver, share):
     assert (table.share(1.0)[0], table.share_together(1.0)[0]) == (share, share)
 
 
+def test_elements_that_the_solver_relaxes_limit_no_step():
+    """XPBD takes springs of any stiffness, and a law that is no constraint as symplectic Euler does."""
+
+    @pm.spring_force
+    def rod(x1, v1, x2, v2, t, k=30.0):
+        return -k * (x1 - x2)
+
+    system = spring_pair(1e8, 0.0, (1.0, 1.0))
+    report = system.stability("xpbd")
+    assert (report.largest_safe_dt, report.elements[0].share(1.0)[0]) == (np.inf, 0.0)
+    assert report.frequency == pytest.approx(np.sqrt(2e8), rel=1e-9)
+    system = pm.ParticleSystem(system.particles, [*system.forces, rod(pairs=[(0, 1)], k=50.0)])
+    report = system.stability("xpbd")
+    assert report.largest_safe_dt == pytest.approx(2 / np.sqrt(2 * 50.0), rel=1e-6)
+    assert [t.share(0.1)[0] for t in report.elements] == pytest.approx([0.0, 0.5], rel=1e-6)
+
+
 def test_each_of_many_springs_has_its_own_figures():
     """Random springs between random masses: more damping ratios than are tried, so limits are interpolated."""
     rng = np.random.default_rng(3)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass import random
-from pointmass.laws.elements import ElementForce
+from pointmass.laws.elements import ConstraintForce, ElementForce
 from pointmass.solvers.base import Array, Solver
 from pointmass.solvers.stability import largest_safe_steps
 
@@ -173,6 +173,10 @@ def element_motions(
     modes += [(pull[each.rows].max(axis=1), drag[each.rows].max(axis=1)) for each in blocks]
     sizes = np.cumsum([len(stiffness) for stiffness, _ in modes])[:-1]
     steps = np.split(largest_safe_steps(solver, *(np.concatenate(each) for each in zip(*modes, strict=True))), sizes)
+    if solver.relaxes:
+        elastic = [isinstance(each.force, ConstraintForce) for each in blocks]
+        owners = [elastic[k // 2] for k in range(2 * len(blocks))] + elastic
+        steps = [np.full(len(step), np.inf) if free else step for step, free in zip(steps, owners, strict=True)]
     together = steps[2 * len(blocks) :]
     least = min((float(step.min(initial=np.inf)) for step in together), default=np.inf)
     scale = max(1.0, limit / least) if 0.0 < least < np.inf else 1.0

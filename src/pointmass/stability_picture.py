@@ -14,7 +14,7 @@ from pointmass.colors import linear
 from pointmass.frame import Camera, Drawable, Frame, Points, Segments
 from pointmass.render import fit_camera, image
 from pointmass.solvers.stability import amplification, amplification_of_modes
-from pointmass.stability import Modes, Stability, modes
+from pointmass.stability import Modes, Stability, limiting, modes
 
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture
@@ -103,7 +103,8 @@ def stability_picture(simulation: Simulation, found: Stability, camera: Camera |
     """
     from PIL import Image, ImageDraw
 
-    motions = modes(simulation.system)
+    with limiting(simulation.system, simulation.solver):
+        motions = modes(simulation.system)
     z = motions.values * simulation.dt
     plane = Plane.around(z)
     picture = Image.new("RGB", SIZE, BACK)
