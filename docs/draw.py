@@ -12,6 +12,7 @@ from PIL import Image
 import pointmass as pm
 from pointmass.colors import linear
 from pointmass.render import fit_camera, image
+from pointmass.stability_picture import stability_picture
 
 FOLDER = Path(__file__).parent / "images"
 SIZE = (640, 360)
@@ -45,8 +46,13 @@ def drawing(*drawables):
 
 def save(name, frame, camera=FACE_ON, size=SIZE):
     """Draw a frame into docs/images."""
+    store(name, image(frame, camera=camera, size=size))
+
+
+def store(name, pixels):
+    """Write a picture into docs/images."""
     target = FOLDER / f"{name}.jpg"
-    picture = Image.fromarray(image(frame, camera=camera, size=size))
+    picture = Image.fromarray(pixels)
     picture.save(target, quality=90, subsampling=0, optimize=True)  # smooth glows want more than a PNG's 256 colours
     print(f"{target.name}: {target.stat().st_size / 1000:.0f} kB")
 
@@ -117,6 +123,24 @@ def phase():
         y = pm.integrate(spring, solver, (0.0, 0.2 * steps), 0.2).y[:, [0, 3]]
         lines += [curve(solver.name, y, color), dots(f"{solver.name} steps", y, color, 0.03)]
     save("phase", drawing(*lines))
+
+
+def stability():
+    """A sheet that becomes stiffer from left to right, for steps of RK4 that are a little too long."""
+    at = np.arange(12 * 8).reshape(12, 8)
+    links = [(at[1:], at[:-1]), (at[:, 1:], at[:, :-1]), (at[1:, 1:], at[:-1, :-1]), (at[1:, :-1], at[:-1, 1:])]
+    pairs = np.concatenate([np.stack([a.ravel(), b.ravel()], axis=1) for a, b in links])
+    x = np.array([[0.1 * i, 0.1 * j, 0.0] for i in range(12) for j in range(8)])
+    stiffness = 30.0 * 40.0 ** (x[pairs, 0].mean(axis=1) / 1.1)
+    sheet = pm.Particles(x, m=0.01)
+    sheet.pin(at[:, -1])
+    springs = pm.Springs(pairs, k_s=stiffness, k_d=0.45 * np.sqrt(0.005 * stiffness))
+    system = pm.ParticleSystem(sheet, [pm.Gravity(), springs])
+    limit = system.stability("rk4").largest_safe_dt
+    sim = pm.Simulation(system, "rk4", dt=1.08 * limit, look=pm.Look(size=0.012, spring_width=0.009))
+    camera = pm.Camera(azimuth=0.0, elevation=0.0, fov=25.0)
+    picture = Image.fromarray(stability_picture(sim, system.stability("rk4"), camera))
+    store("stability", np.asarray(picture.resize((960, 540), Image.Resampling.LANCZOS)))
 
 
 def drag():
@@ -313,6 +337,7 @@ PICTURES = (
     flow,
     euler,
     phase,
+    stability,
     drag,
     bounces,
     cloth,

@@ -117,7 +117,7 @@ def test_pictures_are_small_and_shown() -> None:
 
 def test_every_picture_is_drawn_by_the_program() -> None:
     program = (ROOT / "docs" / "draw.py").read_text(encoding="utf-8")
-    drawn = set(re.findall(r'(?:save|rain|scene_picture)\(\s*"([\w-]+)', program))
+    drawn = set(re.findall(r'(?:save|store|rain|scene_picture)\(\s*"([\w-]+)', program))
     drawn |= {f"scene-{name}" for name in re.findall(r'shipped\("(\w+)', program)}
     assert drawn == {picture.stem for picture in (ROOT / "docs" / "images").iterdir()}
     assert drawn >= {f"scene-{name}" for name in pm.SCENES}

@@ -184,3 +184,83 @@ def test_a_damped_sheet_of_unequal_masses(n):
     zeta = 0.5 * omega / 200.0  # k_d/k_s = 2 zeta/omega for every motion
     limit = system.stability("symplectic_euler").largest_safe_dt
     assert limit == pytest.approx(2 * (np.sqrt(1 + zeta**2) - zeta) / omega, rel=1e-4)
+
+
+def a_chain():
+    body = pm.chain(8, k_s=500.0, damping_ratio=0.3, mass=2.4)
+    return pm.ParticleSystem(body.particles, [*body.forces, pm.Drag(0.05)])
+
+
+def a_lattice():
+    body = pm.lattice((2, 2, 3), k_s=200.0, damping_ratio=0.2)
+    return pm.ParticleSystem(body.particles, body.forces)
+
+
+def two_damped_masses():
+    springs = pm.Springs([(0, 1)], k_s=90.0, k_d=2.0)
+    return pm.ParticleSystem(pm.Particles([[0, 0, 0], [0, 1, 0]], m=[0.3, 1.1]), [springs])
+
+
+def a_hanging_net():
+    """Held at two corners, in balance: its springs are stretched, so they also resist motion across."""
+    at = np.arange(16).reshape(4, 4)
+    lines = ((at[1:], at[:-1]), (at[:, 1:], at[:, :-1]))
+    pairs = np.concatenate([np.stack([a.ravel(), b.ravel()], axis=1) for a, b in lines])
+    p = pm.Particles([[0.2 * (k % 4), -0.2 * (k // 4), 0] for k in range(16)], m=0.05)
+    p.pin([0, 3])
+    system = pm.ParticleSystem(p, [pm.Gravity(), pm.Drag(0.3), pm.Springs(pairs, k_s=100.0, k_d=0.4, rest=0.19)])
+    pm.Simulation(system, pm.ImplicitEuler(), dt=0.5, compiled=False).step(80)
+    return system
+
+
+def a_chain_of_joints():
+    """Straight, where an angle has no force at all, but its whole stiffness.
+
+    The air damps it: a damped angle resists along the bend that there is, and near none that turns within a step.
+    """
+    p = pm.Particles(0.1 * np.arange(7.0)[:, None] * [1, 0, 0], m=0.02)
+    p.pin([0, 1])
+    links = pm.Springs([(k, k + 1) for k in range(6)], k_s=50.0)
+    angles = pm.Angles([(k, k + 1, k + 2) for k in range(5)], k_s=0.5)
+    return pm.ParticleSystem(p, [links, angles, pm.Drag(1.0)])
+
+
+def a_lattice_of_unequal_masses():
+    system = a_lattice()
+    system.particles.m[:] *= np.geomspace(0.2, 5.0, 12)
+    return system
+
+
+def growth(system: pm.ParticleSystem, solver, dt: float) -> float:
+    """How much larger speeds are after 800 steps than in the first three, from a displacement of a ten-millionth.
+
+    That small, an unstable motion has room to grow before it is anything but linear.
+    """
+    p, n = system.particles, len(system.particles)
+    y, memory = system.get_state(), solver.start(system)
+    y[: 3 * n] += (1e-7 * np.random.default_rng(1).normal(size=(n, 3)) * ~p.pinned[:, None]).ravel()
+    y[3 * n :] = 0.0
+    first, last = 0.0, 0.0
+    for k in range(800):
+        with np.errstate(all="ignore"):
+            step = solver.step(system, k * dt, y, dt, memory)
+        y, memory = step.y1, step.memory
+        last = float(np.abs(y[3 * n :]).max())
+        first = max(first, last) if k < 3 else first
+        if not last < 1e3 * first:
+            return np.inf
+    return last / first
+
+
+@pytest.mark.parametrize(
+    "make",
+    [a_chain, a_lattice, two_damped_masses, a_hanging_net, a_chain_of_joints, a_lattice_of_unequal_masses],
+)
+def test_the_largest_safe_step_is_just_below_the_one_that_diverges(make) -> None:
+    """Runs of the system itself: a little below nothing grows, and at 5/4 of it motions do."""
+    system = make()
+    for solver in (pm.Euler(), pm.SymplecticEuler(), pm.Leapfrog(), pm.RK4(), pm.Heun()):
+        limit = system.stability(solver).largest_safe_dt
+        assert 0 < limit < np.inf, solver.name
+        assert growth(system, solver, 0.97 * limit) < 1.0, solver.name
+        assert growth(system, solver, 1.25 * limit) > 10.0, solver.name

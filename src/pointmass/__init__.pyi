@@ -105,6 +105,9 @@ from .errors import (
 from .errors import (
     PointmassError as PointmassError,
 )
+from .errors import (
+    UnstableStep as UnstableStep,
+)
 from .forces import (
     FORCES as FORCES,
 )

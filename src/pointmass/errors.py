@@ -55,6 +55,10 @@ class Diverged(PointmassError, ArithmeticError):
         self.largest_safe_dt = largest_safe_dt
 
 
+class UnstableStep(UserWarning):
+    """A step is longer than the largest with which the motions at the start of a run stay in bounds; it runs anyway."""
+
+
 def unknown(what: str, name: object, known: Iterable[str]) -> InvalidInput:
     """The error for a name that is not in a list, with the nearest one that is."""
     names = sorted(known)

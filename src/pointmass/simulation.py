@@ -15,7 +15,7 @@ from pointmass.emitters.emitter import Birth, Emitter
 from pointmass.engine.engine import Engine, compiled_by_default
 from pointmass.engine.island import Span
 from pointmass.engine.kernels import grow_old
-from pointmass.errors import Diverged, InvalidInput, number, shown, unknown, whole_number
+from pointmass.errors import Diverged, InvalidInput, UnstableStep, number, shown, unknown, whole_number
 from pointmass.frame import Frame
 from pointmass.lineage import Lineage
 from pointmass.look import Look, Stage
@@ -24,6 +24,7 @@ from pointmass.solvers import as_solver
 from pointmass.solvers.advance import advance
 from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.control import control_of
+from pointmass.step_warning import too_long
 from pointmass.system import ParticleSystem
 from pointmass.zones import WHEN_FULL, WhenFull, Zone, killed, oldest, with_room
 
@@ -126,6 +127,7 @@ class Simulation:
         self._deaths = Deaths()
         self._deaths.add(p.id, self.t0 + (p.lifetime - p.age))
         self._speed_limit = RUNAWAY * self._natural_speed()
+        self._looked_at_step = False
 
     @property
     def t(self) -> float:
@@ -142,6 +144,11 @@ class Simulation:
             largest stable dt.
         InvalidInput
             A parameter that is a function of t has a value that is not allowed; the system keeps its last good state.
+
+        Warns
+        -----
+        UnstableStep
+            Once, before the first step: dt is too long for the springs at the start.
         """
         end = self.steps + whole_number("count", count, at_least=0)
         while self.steps < end:
@@ -237,6 +244,11 @@ class Simulation:
         ----------
         look_inside : whether the state within the last step will be asked for.
         """
+        if not self._looked_at_step:
+            self._looked_at_step = True
+            problem = too_long(self.system, self.solver, self.dt)
+            if problem is not None:
+                warnings.warn(problem, UnstableStep, stacklevel=3)
         if not self.engine.compiled:
             self._step()
             return

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pointmass.element_motion import Element, ElementMotions, bent, element_blocks, element_motions
 from pointmass.errors import InvalidInput
 from pointmass.solvers.base import Array, Solver
-from pointmass.solvers.stability import Complex, largest_safe_step, safe_step
+from pointmass.solvers.stability import Complex, largest_safe_step, largest_safe_steps, safe_step
 
 if TYPE_CHECKING:
     from pointmass.system import ParticleSystem
@@ -22,12 +24,15 @@ WORK = 2  # as long as that is no more work than for this many of them
 WANTED = 4  # eigenvalues of each kind in larger systems
 ACCURACY = 1e-9
 STANDING = 1e-6  # of the fastest motion: slower ones are round-off of those that stand still, double eigenvalues
+SMALL = 200  # dimension up to which all motions are found to get one
+VECTOR = 1e-4  # residual of the motion that elements carry: their energies are off by its square
+NOTHING = 1e-3  # of what the first one carries: who has less is not named
 ITERATION: dict[str, Any] = {"ncv": 80, "maxiter": 100, "tol": ACCURACY}
 
 
 @dataclass(frozen=True)
 class Stability:
-    """A report.
+    """A report; as text it is a page for people.
 
     Attributes
     ----------
@@ -35,12 +40,43 @@ class Stability:
     frequency : highest angular frequency of the system, |lambda| [rad/s]; 0 without forces that vary.
     damping_ratio : of that motion, -Re(lambda)/|lambda|.
     period : 2 pi / frequency [s].
+    solver : name of the solver whose limits these are.
+    elements : of each force on springs, joints and other elements that acts: how near each of them is to the limit, and
+        what it carries of the motion that limits the step.
     """
 
     largest_safe_dt: float
     frequency: float
     damping_ratio: float
     period: float
+    solver: str = ""
+    elements: tuple[ElementMotions, ...] = field(default=(), compare=False)
+
+    def carriers(self, count: int = 3) -> list[Element]:
+        """The elements with most of the energy of the motion that limits the step, at most `count` of them."""
+        most = [(table, np.argsort(-table.part, kind="stable")[:count]) for table in self.elements]
+        found = [table.element(int(number)) for table, numbers in most for number in numbers]
+        found.sort(key=lambda e: -e.part)
+        return [e for e in found[:count] if e.part > max(0.0, NOTHING * found[0].part)]
+
+    def __str__(self) -> str:
+        step = "any" if math.isinf(self.largest_safe_dt) else f"{self.largest_safe_dt:.4g} s"
+        lines = [f"largest safe dt of {self.solver}: {step}", f"fastest motion: {self.motion}"]
+        for table in sorted(self.elements, key=lambda table: -table.frequency.max()):
+            low, high = table.frequency.min(), table.frequency.max()
+            lines.append(
+                f"{table.family}: {len(table.ids)} elements of {low:.4g} to {high:.4g} rad/s alone, "
+                f"damping ratio {table.damping_ratio.min():.3g} to {table.damping_ratio.max():.3g}"
+            )
+        lines += [f"{100 * e.part:.3g} % of the fastest motion is in {e}" for e in self.carriers()]
+        return "\n".join(lines)
+
+    @property
+    def motion(self) -> str:
+        """The fastest motion in words."""
+        if not self.frequency:
+            return "nothing swings or decays"
+        return f"{self.frequency:.4g} rad/s, period {self.period:.4g} s, damping ratio {self.damping_ratio:.3g}"
 
 
 def stability(system: ParticleSystem, solver: Solver) -> Stability:
@@ -55,15 +91,27 @@ def stability(system: ParticleSystem, solver: Solver) -> Stability:
     found = _modes(system, matrix)
     fast = found.values[np.abs(found.values).argmax()] if len(found.values) else 0.0
     size = float(np.abs(fast))
+    bound = matrix
+    if solver.relaxes:
+        with limiting(system, solver):
+            bound = _linearised(system)
+            found = _modes(system, bound)
     limit = largest_safe_step(solver, found.stiffness, found.damping)
     if system.order == 2:
-        limit = safe_step(solver, matrix, limit, found.growth)
+        limit = safe_step(solver, bound, limit, found.growth)
     return Stability(
         largest_safe_dt=limit,
         frequency=size,
-        damping_ratio=float(-np.real(fast) / size) if size > 0 else 0.0,
+        damping_ratio=float(0.0 - np.real(fast) / size) if size > 0 else 0.0,
         period=2 * math.pi / size if size > 0 else math.inf,
+        solver=solver.name,
+        elements=_elements(system, solver, matrix, limit),
     )
+
+
+def limiting(system: ParticleSystem, solver: Solver) -> AbstractContextManager[None]:
+    """Inside, only those forces act that limit the steps of a solver: XPBD takes elastic elements of any stiffness."""
+    return system.slack() if solver.relaxes else nullcontext()
 
 
 def eigenvalues(system: ParticleSystem) -> Complex:
@@ -76,7 +124,12 @@ def eigenvalues(system: ParticleSystem) -> Complex:
     InvalidInput
         The forces are not finite, or have no Jacobian, or the iteration does not converge.
     """
-    return _modes(system, _linearised(system)).values
+    return modes(system).values
+
+
+def modes(system: ParticleSystem) -> Modes:
+    """The motions whose eigenvalues `eigenvalues` gives."""
+    return _modes(system, _linearised(system))
 
 
 class Modes(NamedTuple):
@@ -101,7 +154,9 @@ def _linearised(system: ParticleSystem) -> Any:
 
     if not len(system.particles):
         return csr_array((0, 0))
-    matrix = system.jacobian(system.t, system.get_state()).astype(np.float64)
+    state = system.get_state()
+    state[: 3 * len(system.particles)] = bent(system).ravel()
+    matrix = system.jacobian(system.t, state).astype(np.float64)
     if not np.isfinite(matrix.data).all():
         raise InvalidInput("the forces are not finite where the particles are now: there is no largest step")
     if system.order == 1:
@@ -110,7 +165,44 @@ def _linearised(system: ParticleSystem) -> Any:
     entries = matrix.tocoo()
     row, column = entries.coords
     scaled = entries.data * root[row] / root[column]  # x' = v stays exactly that
+    scaled[np.isinf(np.tile(system.inertia, 2))[column]] = 0.0  # nobody feels the motion of who has none
     return csr_array((scaled, (row, column)), shape=matrix.shape)
+
+
+def _elements(system: ParticleSystem, solver: Solver, matrix: Any, limit: float) -> tuple[ElementMotions, ...]:
+    """What each element does by itself, and what it carries of the motion that limits the step."""
+    blocks = element_blocks(system)
+    if not blocks:
+        return ()
+    n = len(system.particles)
+    pull, damping = (-_symmetric_part(part) for part in (matrix[3 * n :, : 3 * n], matrix[3 * n :, 3 * n :]))
+    islands = np.repeat(system.island_of_particle, 3)
+    motions = [_strongest(part, islands) for part in (pull, damping)]
+    stiffness, drags = ([float(x @ (part @ x)) for x in motions] for part in (pull, damping))
+    by_drag = bool(np.argmin(largest_safe_steps(solver, stiffness, drags)))
+    energy = (drags if by_drag else stiffness)[int(by_drag)]
+    vector = motions[int(by_drag)] / math.sqrt(energy) if energy > 0.0 else np.zeros(3 * n)
+    return element_motions(blocks, n, solver, limit, vector, by_drag)
+
+
+def _strongest(matrix: Any, islands: NDArray[np.intp]) -> Array:
+    """Eigenvector of the largest eigenvalue, in one island: others that are alike move for themselves."""
+    from scipy.sparse.linalg import eigsh
+
+    size = matrix.shape[0]
+    if not matrix.count_nonzero():
+        return np.zeros(size)
+    if size <= SMALL:
+        vector = np.linalg.eigh(matrix.toarray())[1][:, -1]
+    else:
+        vector = eigsh(matrix, k=1, which="LA", v0=np.cos(np.arange(size)), tol=VECTOR)[1][:, 0]
+    mine = islands == np.bincount(islands, vector * vector).argmax()
+    vector = np.where(mine, vector, 0.0)
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def _symmetric_part(matrix: Any) -> Any:
+    return 0.5 * (matrix + matrix.T)
 
 
 def _modes(system: ParticleSystem, matrix: Any) -> Modes:

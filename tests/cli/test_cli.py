@@ -157,9 +157,9 @@ def test_a_second_run_replaces_the_first_with_the_same_bits(folder: Path) -> Non
 def test_a_divergence_keeps_the_frames_before_it(folder: Path) -> None:
     done = pointmass("run", "bursting.toml", "-o", "d.zarr", "--json")
     assert done.exit_code == 3
-    assert re.fullmatch(
-        r"pointmass: diverged in step \d+ .* at particle .*; \d+ frames kept in 'd.zarr'\n", done.stderr
-    )
+    warned, ended = done.stderr.splitlines()
+    assert warned.startswith("pointmass: euler amplifies the motion of spring 0 (particles 0-1) at any dt")
+    assert re.fullmatch(r"pointmass: diverged in step \d+ .* at particle .*; \d+ frames kept in 'd.zarr'", ended)
     result = json.loads(done.stdout)
     assert 0 < result["frames"] < 200
     assert result["diverged"]["step"] > 0
@@ -231,8 +231,9 @@ def test_export_writes_arrays(folder: Path) -> None:
 def test_check_says_what_is_safe(folder: Path) -> None:
     result = json.loads(pointmass("check", "pendulum", "--json").stdout)
     assert set(result) == {
-        "scene", "solver", "dt", "largest_safe_dt", "frequency", "damping_ratio", "period", "safe",
-        "particles", "springs", "forces", "emitters",
+        "scene", "solver", "dt", "largest_safe_dt", "recommended_dt", "recommended_substeps",
+        "frequency", "damping_ratio", "period", "safe",
+        "particles", "springs", "forces", "emitters", "families", "carriers", "warning",
     }  # fmt: skip
     assert result["safe"] is True
     assert (result["particles"], result["springs"], result["solver"]) == (13, 12, "leapfrog")
@@ -246,6 +247,73 @@ def test_check_says_what_is_safe(folder: Path) -> None:
     free = json.loads(pointmass("check", "a.toml", "--set", "forces.1.k=0", "--json").stdout)
     assert (free["largest_safe_dt"], free["period"], free["frequency"], free["safe"]) == (None, None, 0.0, True)
     assert "amplifies this motion at any dt" in pointmass("check", "orbit", "--solver", "euler").stdout
+
+
+def test_a_run_with_too_long_a_step_says_so_in_one_line_and_runs(folder: Path) -> None:
+    (folder / "stiff.toml").write_text(BURSTING.replace("euler", "leapfrog").replace("1e5", "30000.0"))
+    arguments = ["run", "stiff.toml", "-o", "s.zarr", "--frames", "2"]
+    done = pointmass(*arguments)
+    assert done.exit_code == 0
+    lines = [line for line in done.stderr.splitlines() if "too long" in line]
+    assert lines == [
+        "pointmass: dt = 0.01 s is too long for leapfrog: spring 0 (particles 0-1) takes part in a motion with "
+        "omega dt = 2.45, and the limit is 2; the largest safe dt is about 0.00816 s: use a smaller dt, more substeps "
+        "or implicit_euler"
+    ]
+    assert pointmass(*arguments, "--quiet").stderr == ""
+    assert "too long" not in pointmass(*arguments, "--dt", "0.008").stderr
+
+
+def test_check_says_which_springs_are_nearest_to_the_limit(folder: Path) -> None:
+    """Two masses of 0.5 kg on a spring of 100 N/m: w = 20, and of leapfrog's limit 2 a step of 0.05 takes a half."""
+    (folder / "two.toml").write_text(
+        """
+        dt = 0.05
+        solver = "leapfrog"
+        forces = [{type = "gravity"}, {type = "springs", pairs = [[0, 1]], k_s = 100.0, family = "shear"},
+                  {type = "springs", pairs = [[2, 3]], k_s = 25.0}]
+        [[bodies]]
+        type = "points"
+        x = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]
+        m = 0.5
+        """
+    )
+    result = json.loads(pointmass("check", "two.toml", "--json").stdout)
+    shear, other = result["families"]
+    assert (shear["family"], shear["force"], shear["count"], other["family"]) == ("shear", "springs", 1, "springs")
+    assert (shear["omega_dt"], shear["share"], shear["share_together"]) == (pytest.approx(1), *[pytest.approx(0.5)] * 2)
+    assert (other["omega_dt"], other["share"], other["damping_ratio"]) == (pytest.approx(0.5), pytest.approx(0.25), 0)
+    (carrier,) = result["carriers"]
+    assert (carrier["name"], carrier["particles"]) == ("spring 0 of family shear (particles 0-1)", [0, 1])
+    assert carrier["part"] == shear["part"] == pytest.approx(1.0)
+    assert (result["recommended_dt"], result["recommended_substeps"], result["safe"]) == (0.095, 1, True)
+    text = pointmass("check", "two.toml").stdout
+    assert re.search(r"carried by +spring 0 of family shear \(particles 0-1\): 100 % of its energy", text)
+    assert re.search(r"elements +family +count +omega dt +damping +alone +together +carries\n", text)
+    assert re.search(r"shear +1 +1 +0 +50 % +50 % +100 %\n", text)
+    assert "warning          gravity acts, but nothing is pinned and there is no floor" in text
+    stiff = ["check", "two.toml", "--set", "forces.1.k_s=1e9"]
+    assert "would need 556 substeps in each frame; use --solver implicit_euler" in pointmass(*stiff).stdout
+    implicit = json.loads(pointmass(*stiff, "--json", "--solver", "implicit_euler").stdout)
+    assert (implicit["safe"], implicit["recommended_dt"], implicit["families"][0]["share"]) == (True, None, 0.0)
+    euler = json.loads(pointmass("check", "two.toml", "--json", "--solver", "euler").stdout)
+    assert (euler["families"][0]["share"], euler["recommended_dt"], euler["largest_safe_dt"]) == (None, None, 0.0)
+
+
+@pytest.mark.parametrize(
+    "held",
+    [
+        '[[colliders]]\ntype = "plane"',
+        '[[zones]]\ntype = "half_space"',
+        '[[forces]]\ntype = "harmonic"',
+        '[[bodies]]\ntype = "points"\nx = [[0, 0, 0]]\npinned = [0]',
+    ],
+)
+def test_check_warns_of_a_fall_for_ever_only_where_nothing_ends_it(folder: Path, held: str) -> None:
+    free = '[[forces]]\ntype = "gravity"\n[[bodies]]\ntype = "points"\nx = [[1, 2, 3]]\n'
+    for text, warned in ((free, True), (f"{free}{held}\n", False)):
+        (folder / "free.toml").write_text(text)
+        assert (json.loads(pointmass("check", "free.toml", "--json").stdout)["warning"] is not None) is warned
 
 
 def test_check_looks_at_the_first_particle_of_each_emitter(folder: Path) -> None:

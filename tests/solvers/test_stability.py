@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from solver_problems import fixed
 
-from pointmass.solvers import SOLVERS, DormandPrince, ImplicitEuler, amplification, largest_safe_step
+from pointmass.solvers import (
+    SOLVERS,
+    DormandPrince,
+    ImplicitEuler,
+    amplification,
+    largest_safe_step,
+    largest_safe_steps,
+)
 
 UNDAMPED = {
     "euler": 0.0,
@@ -78,3 +85,29 @@ def test_bdf2_damps_less_than_backward_euler():
     root = np.abs(np.roots([1.5 - 0.1j, -2.0, 0.5])).max()
     assert amplification(SOLVERS["bdf2"], 1.0, 0.0, 0.1) == pytest.approx(root, rel=1e-12)
     assert root == pytest.approx(0.99998, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", ["symplectic_euler", "leapfrog", "rk4", "euler", "heun", "implicit_euler"])
+def test_limits_of_many_modes_are_those_of_each(name):
+    """A few different damping ratios are tried; of many those in between are interpolated.
+
+    Where two real eigenvalues meet (zeta = 1) a growth of 1e-9 moves the limit by some 1e-5.
+    """
+    rng = np.random.default_rng(2)
+    zeta, omega = rng.choice([0.0, 0.1, 0.5, 1.0, 3.0], 400), rng.uniform(0.1, 50.0, 400)
+    limits = largest_safe_steps(fixed(name), omega**2, 2 * zeta * omega)
+    for k in range(0, 400, 40):
+        assert limits[k] == pytest.approx(
+            largest_safe_step(fixed(name), omega[k] ** 2, 2 * zeta[k] * omega[k]), rel=1e-4
+        )
+    zeta = rng.uniform(0.02, 2.0, 400)
+    limits = largest_safe_steps(fixed(name), omega**2, 2 * zeta * omega)
+    for k in range(0, 400, 40):
+        assert limits[k] == pytest.approx(
+            largest_safe_step(fixed(name), omega[k] ** 2, 2 * zeta[k] * omega[k]), rel=5e-3
+        )
+
+
+def test_many_modes_that_do_not_move_or_push_apart_have_no_limit():
+    np.testing.assert_array_equal(largest_safe_steps(fixed("rk4"), [0.0, -4.0], [0.0, 0.0]), [np.inf, np.inf])
+    assert largest_safe_steps(DormandPrince(), [1e12], [0.0])[0] == np.inf

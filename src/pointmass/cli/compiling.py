@@ -1,9 +1,10 @@
-"""Says why the first frame, or the first picture, on a machine takes long."""
+"""Says why the first frame, or the first picture, on a machine takes long, and what the library warns of."""
 
 from __future__ import annotations
 
 import logging
 import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -50,3 +51,17 @@ def laws_said(quiet: bool) -> Iterator[None]:
     finally:
         logger.removeHandler(handler)
         logger.setLevel(before)
+
+
+@contextmanager
+def warnings_said(quiet: bool) -> Iterator[None]:
+    """Pass what the library warns of on to stderr, each as one line."""
+
+    def say(message: Warning | str, *_: Any, **__: Any) -> None:
+        if not quiet:
+            print(f"pointmass: {' '.join(str(message).split())}", file=sys.stderr)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UserWarning)
+        warnings.showwarning = say
+        yield

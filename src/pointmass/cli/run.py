@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pointmass.cli.compiling import laws_said
+from pointmass.cli.compiling import laws_said, warnings_said
 from pointmass.cli.main import stopped
 from pointmass.cli.options import RunOptions, as_json, default_output, load_scene, quiet, run_options
 from pointmass.cli.progress import progress
@@ -57,14 +57,13 @@ def simulate(scene: Scene, path: Path, report: Report, quiet: bool, *, overwrite
     from pointmass.cache import check_target, record
 
     check_target(path, overwrite)
-    simulation = scene.simulation()
-    with laws_said(quiet), progress("simulating", scene.frames, quiet) as tick:
+    with warnings_said(quiet), laws_said(quiet), progress("simulating", scene.frames, quiet) as tick:
 
         def count(frames: int) -> None:
             report.frames = frames
             tick(frames)
 
-        record(simulation, path, scene.frames, scene.fps, scene=scene, overwrite=overwrite, progress=count)
+        record(scene.simulation(), path, scene.frames, scene.fps, scene=scene, overwrite=overwrite, progress=count)
 
 
 def _kept(error: Exception, report: Report) -> str:

@@ -120,12 +120,23 @@ class ElementForce(Force):
 
     def add_jacobian(self, particles: Particles, t: Any, x: Array, v: Array, blocks: Blocks) -> None:
         rows = self.rows(particles)
+        dx, dv = self.element_jacobians(particles, t, x, v)
+        for a in range(self.nodes):
+            for b in range(self.nodes):
+                blocks.add(rows[:, a], rows[:, b], dx[:, a, :, b], dv[:, a, :, b])
+
+    def element_jacobians(self, particles: Particles, t: Any, x: Array, v: Array) -> tuple[Array, Array]:
+        """df/dx and df/dv of each element for itself, each of shape (e, nodes, 3, nodes, 3).
+
+        Numbers of one kind lie side by side in memory, so that what is done with all elements runs along them.
+        """
+        k, e = self.nodes, len(self.ids)
         values = self._jacobian.columns(*self._inputs(self._jacobian, particles, t, x, v))
-        k = self.nodes
-        all_ = matrix(values, len(rows), x.dtype).reshape(-1, k, 3, k, 2, 3)
-        for a in range(k):
-            for b in range(k):
-                blocks.add(rows[:, a], rows[:, b], all_[:, a, :, b, 0], all_[:, a, :, b, 1])
+        both = np.empty((len(values), e), x.dtype)
+        for row, column in zip(both, values, strict=True):
+            row[:] = column
+        both = np.moveaxis(both.reshape(k, 3, k, 2, 3, e), -1, 0)
+        return both[:, :, :, :, 0], both[:, :, :, :, 1]
 
     def energy(self, particles: Particles, t: float, x: Array, v: Array) -> float | None:
         if self.traced_energy is None:

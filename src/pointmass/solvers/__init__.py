@@ -22,7 +22,7 @@ from pointmass.solvers.midpoint import Midpoint
 from pointmass.solvers.registry import ALIASES, SOLVERS, as_solver, find_solver
 from pointmass.solvers.rk4 import RK4
 from pointmass.solvers.splitting import Splitting, Substep
-from pointmass.solvers.stability import amplification, largest_safe_step
+from pointmass.solvers.stability import amplification, largest_safe_step, largest_safe_steps
 from pointmass.solvers.symplectic_euler import SymplecticEuler
 from pointmass.solvers.xpbd import XPBD
 from pointmass.solvers.yoshida4 import Yoshida4
@@ -63,4 +63,5 @@ __all__ = [
     "first_root",
     "integrate",
     "largest_safe_step",
+    "largest_safe_steps",
 ]

@@ -19,6 +19,7 @@ SHORTEST, LONGEST, TRIALS = 2e-3, 1e4, 200  # steps to try, times the size of th
 STRICT, TOLERANCE = 1e-12, 1e-9  # growth per step that is round-off, for short steps and for others
 SHORT = 0.02
 HALVINGS = 40
+RATIOS = 64  # damping ratios of many modes that are tried; what lies between is interpolated
 RUN, GROWTH, SHORTENED = 300, 10.0, 0.98  # a run that finds growth: steps of each half, factor; step after it
 
 Complex = NDArray[np.complex128]
@@ -45,6 +46,11 @@ def amplification(solver: Solver | type[Solver], omega: ArrayLike, zeta: ArrayLi
     return _amplification(solver, stiffness.ravel(), damping.ravel(), h.ravel()).reshape(h.shape)[()]
 
 
+def amplification_of_modes(solver: Solver, stiffness: Complex, damping: Complex, h: float) -> Array:
+    """Likewise for modes x'' = -stiffness x - damping x', complex where forces turn; shape (k,)."""
+    return _amplification(solver, stiffness, damping, np.full(len(stiffness), h))
+
+
 def largest_safe_step(solver: Solver, stiffness: ArrayLike, damping: ArrayLike) -> float:
     """The largest h such that no step in (0, h] amplifies a mode x'' = -stiffness x - damping x'.
 
@@ -64,6 +70,45 @@ def largest_safe_step(solver: Solver, stiffness: ArrayLike, damping: ArrayLike) 
     if control_of(solver) is not None or not modes.size:
         return float("inf")
     return float(_limits(solver, *_fastest(modes)).min(initial=float("inf")))
+
+
+def largest_safe_steps(solver: Solver, stiffness: ArrayLike, damping: ArrayLike) -> Array:
+    """The limit of `largest_safe_step` for each of many modes on its own [s].
+
+    A solver knows no unit of time, so the limit times the speed of a mode depends on its damping ratio alone: of more
+    than 64 different ones, 64 are tried, and what lies between is interpolated.
+
+    Parameters
+    ----------
+    solver : with its arguments.
+    stiffness, damping : of each mode [1/s^2, 1/s], real numbers, shape (k,). What pushes apart has no limit.
+
+    Returns
+    -------
+    array
+        h [s], shape (k,); infinity where no step is too long, 0 where every step is.
+    """
+    pull, drag = np.broadcast_arrays(np.maximum(stiffness, 0.0), np.maximum(damping, 0.0))
+    root = np.sqrt(pull)
+    speed = root + drag
+    result = np.full(speed.shape, np.inf)
+    moves = speed > 0.0
+    if control_of(solver) is not None or not moves.any():
+        return result
+    ratio = (drag[moves] / speed[moves]).round(9)
+    tried = np.unique(ratio)
+    if len(tried) > RATIOS:
+        tried = np.unique(np.quantile(tried, np.linspace(0.0, 1.0, RATIOS)))
+    limit = _limits(solver, ((1.0 - tried) ** 2).astype(complex), tried.astype(complex))
+    reached = np.interp(ratio, tried, np.minimum(limit, LONGEST))
+    result[moves] = np.where(reached < LONGEST, reached, np.inf) / speed[moves]
+    return result
+
+
+def grows(solver: Solver, stiffness: ArrayLike, damping: ArrayLike, h: ArrayLike) -> NDArray[np.bool_]:
+    """Whether steps of h amplify modes that do not grow by themselves, see `largest_safe_steps`; shape (k,)."""
+    pull, drag, length = np.broadcast_arrays(np.maximum(stiffness, 0.0), np.maximum(damping, 0.0), h)
+    return _grows(solver, pull.astype(complex), drag.astype(complex), length.astype(np.float64))
 
 
 def safe_step(solver: Solver, matrix: Any, h: float, growth: float) -> float:
