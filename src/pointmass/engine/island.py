@@ -424,9 +424,13 @@ class IslandMembers:
         return mine, nodes[mine]
 
     def _family(self, family: Elements, mine: Rows, nodes: Rows) -> tuple[Rows, Incidence]:
-        """Elements in the order of the kernel, by colour where they are relaxed, and where they are."""
+        """Elements in the order of the kernel, and where they are.
+
+        Those that are relaxed are ordered by colour, and then by place: a thread meets the same particles again.
+        """
         if self.kernel.deriv.relaxed and isinstance(family.force, ConstraintForce):
-            by_colour = np.argsort(family.force.colours(self.kernel.system.particles)[mine], kind="stable")
+            colours = family.force.colours(self.kernel.system.particles)[mine]
+            by_colour = np.lexsort((self.place[nodes].min(axis=1, initial=len(self.rows)), colours))
             mine, nodes = mine[by_colour], nodes[by_colour]
         found = incidence(self.place[nodes], self.first)
         return mine[found.order], found
