@@ -10,6 +10,9 @@ from .bodies import (
     chain as chain,
 )
 from .bodies import (
+    cloth as cloth,
+)
+from .bodies import (
     lattice as lattice,
 )
 from .bodies import (
