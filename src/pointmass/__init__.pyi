@@ -154,6 +154,9 @@ from .forces import (
     Harmonic as Harmonic,
 )
 from .forces import (
+    Hinges as Hinges,
+)
+from .forces import (
     LennardJones as LennardJones,
 )
 from .forces import (
