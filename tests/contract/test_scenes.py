@@ -20,6 +20,9 @@ SMALL = {  # fewer particles where the default takes long; the physics is the sa
     "smoke": {"rate": 60.0},
     "bounce": {"balls": 20},
     "dust": {"sand": 400, "dust": 60.0},
+    "cloth": {"particles": 20},
+    "flag": {"particles": 20},
+    "drape": {"particles": 20},
 }
 VARIANTS = [(name, SMALL.get(name, {})) for name in SCENES] + [
     ("orbit", {"kind": "kepler"}),
@@ -83,10 +86,11 @@ QUICK = {
     "springs": {"side": 3},
     "bounce": {"balls": 10},
     **{name: SMALL[name] for name in ("fireworks", "snow", "smoke", "dust")},
+    **{name: {"particles": 10} for name in ("cloth", "flag", "drape")},
 }
 COSTLY = {  # only so many steps
     *("balls", "rate", "links", "side", "particles", "mass", "stiffness", "steps_per_second"),
-    *("launches", "stars", "tail", "smoke", "sand", "dust"),
+    *("launches", "stars", "tail", "smoke", "sand", "dust", "stretch", "bend"),
 }
 ENDS = [
     (name, parameter["name"], value)
@@ -130,7 +134,7 @@ def test_the_ends_of_every_range(name: str, parameter: str, value: object) -> No
 def test_frames_of_a_scene_show_something(name: str) -> None:
     scene = made(name, SMALL.get(name, {})).build()
     last = frames_of(scene, 30)[-1]
-    assert {d.kind for d in last.drawables} & {"points", "segments", "curves"}
+    assert {d.kind for d in last.drawables} & {"points", "segments", "curves", "triangles"}
     for drawable in last.drawables:
         assert drawable.version >= 0
         for attribute in vars(drawable).values():
