@@ -38,6 +38,7 @@ NEEDED: dict[str, dict[str, Any]] = {
     "field": {"force": ["-k*x", "0.1*sin(t)", "vx*0"], "constants": {"k": 2.0}},
     "flow": {"velocity": ["-y", "x", "0.1*t"]},
     "mesh": {"mesh": [[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]]},
+    "cloth_from_mesh": {"mesh": [[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]]},
     "points": {"x": [[0.0, 1.0, 0.0], [0.5, 1.2, 0.1]]},
     "scatter": {"count": 4},
     "polygon": {"vertices": SQUARE},

@@ -13,6 +13,9 @@ from .bodies import (
     cloth as cloth,
 )
 from .bodies import (
+    cloth_from_mesh as cloth_from_mesh,
+)
+from .bodies import (
     lattice as lattice,
 )
 from .bodies import (

@@ -67,7 +67,7 @@ class Drape(ShippedScene):
         """The cloth, the ball and a floor."""
         body = self.body()
         solver, dt = steps(body)
-        surface = {"restitution": 0.0, "friction": self.friction}
+        surface: dict[str, Any] = {"restitution": 0.0, "friction": self.friction}
         size = max(self.side, 2 * self.radius)
         return Scene(
             name=self.name,

@@ -87,7 +87,7 @@ class Flag(ShippedScene):
                 pattern="bands",
                 pattern_color="#f4efe6",
                 pattern_count=5,
-                groups={"pole": {"size": 0.03 * self.height, "color": "#d9b45b"}},
+                groups={"pole": Look(size=0.03 * self.height, color="#d9b45b")},
                 spring_width=0.035 * self.height,
                 spring_color="#8a7f70",
             ),
