@@ -19,6 +19,9 @@ from .bodies import (
     lattice as lattice,
 )
 from .bodies import (
+    net as net,
+)
+from .bodies import (
     points as points,
 )
 from .bodies import (

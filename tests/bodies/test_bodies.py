@@ -19,6 +19,7 @@ EXAMPLES = {
     "scatter": {"count": 12, "radius": 0.1, "radius_range": 0.05, "speed": 2.0},
     "chain": {"links": 7, "length": 2.0, "mass": 3.0},
     "lattice": {"counts": (3, 4, 5), "mass": 2.0},
+    "net": {"rows": 3, "cols": 4, "size": (1.0, 2.0), "links": 2, "pinned": "top edge"},
     "cloth_from_mesh": {"mesh": TETRAHEDRON, "pinned": "top"},
     "cloth": {"rows": 4, "cols": 5, "size": (1.0, 2.0), "pinned": "top corners"},
 }
