@@ -76,8 +76,8 @@ class ClothScene(ShippedScene):
                 PlateWind("cloth", (0.0, 0.0, 0.0), density=self.air),
             ],
             camera=Camera(
-                position=(0.8 * self.width, 0.0, 1.0 * self.width + 1.2 * self.height),
-                target=(0.0, -0.48 * self.height, 0.0),
+                position=(0.8 * self.width, 0.3 * self.height, 1.0 * self.width + 1.2 * self.height),
+                target=(0.0, -0.4 * self.height, 0.0),
                 fov=34.0,
             ),
             look=Look(color="#b8323a", pattern="checker", pattern_color="#efe6d8", pattern_count=10),
