@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -27,16 +28,16 @@ def sheet(particles: int, width: float, height: float, material: str, stretch: f
     return cloth(rows, cols, (width, height), material=material, bend=bend if bend > 0 else None, **more)
 
 
-def steps(body: Body, drag: float = 0.0) -> tuple[SymplecticEuler, float]:
+def steps(body: Body, room: float = 1.0) -> tuple[SymplecticEuler, float]:
     """A solver and its step [s], a part of a sixtieth of a second in which the springs of a cloth stay stable.
 
     Parameters
     ----------
-    drag : rate at which the air slows down the lightest particle [1/s].
+    room : factor on their number, where something else drives the cloth.
     """
     solver = SymplecticEuler()
     stiffness, damping = stiffest(body)
-    return solver, 1 / 60 / max(4, substeps(solver, stiffness, damping + drag))
+    return solver, 1 / 60 / max(4, math.ceil(room * substeps(solver, stiffness, damping)))
 
 
 def check_sheet(body: Body, frames: Sequence[Frame], rows: slice = slice(None)) -> None:
