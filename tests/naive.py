@@ -209,6 +209,39 @@ def angle_energy(x, k_s, k_d, rest):
     return 0.5 * k_s * (joint_angle(x) - rest) ** 2
 
 
+def hinge_angle(x):
+    a, b, c, d = x
+    e = sub(b, a)
+    n1, n2 = cross(e, sub(c, a)), cross(sub(d, a), e)
+    if norm(e) * norm(n1) * norm(n2) == 0:
+        return 0.0
+    fold = math.acos(max(-1.0, min(1.0, dot(n1, n2) / norm(n1) / norm(n2))))
+    return math.copysign(fold, dot(n1, sub(d, a)))
+
+
+def hinge(x, v, k_s, k_d, rest):
+    """By the gradients in Bridson, Marino and Fedkiw 2003, each corner's by itself."""
+    a, b, c, d = x
+    e = sub(b, a)
+    n1, n2, long = cross(e, sub(c, a)), cross(sub(d, a), e), norm(e)
+    if long * norm(n1) * norm(n2) == 0:
+        return [[0.0] * 3] * 4
+    m1, m2 = scale(1 / dot(n1, n1), n1), scale(1 / dot(n2, n2), n2)
+    slopes = [
+        [dot(sub(c, b), e) / long * p + dot(sub(d, b), e) / long * q for p, q in zip(m1, m2, strict=True)],
+        [-dot(sub(c, a), e) / long * p - dot(sub(d, a), e) / long * q for p, q in zip(m1, m2, strict=True)],
+        scale(long, m1),
+        scale(long, m2),
+    ]
+    rate = sum(dot(s, w) for s, w in zip(slopes, v, strict=True))
+    moment = k_s * (hinge_angle(x) - rest) + k_d * rate
+    return [scale(-moment, s) for s in slopes]
+
+
+def hinge_energy(x, k_s, k_d, rest):
+    return 0.5 * k_s * (hinge_angle(x) - rest) ** 2
+
+
 # ------------------------------------------------------------------------------------------------ pairs
 
 

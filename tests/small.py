@@ -9,4 +9,7 @@ SMALL: dict[str, dict[str, object]] = {  # fewer particles where the default tak
     "smoke": {"rate": 60.0},
     "bounce": {"balls": 20},
     "dust": {"sand": 400, "dust": 60.0},
+    "cloth": {"particles": 20},
+    "flag": {"particles": 20},
+    "drape": {"particles": 20},
 }

@@ -33,10 +33,12 @@ NEEDED: dict[str, dict[str, Any]] = {
     "surface_attractor": {"around": [{"type": "sphere", "radius": 0.4}]},  # what cannot be left out, by kind
     "springs": {"pairs": [[0, 1], [1, 2]]},
     "angles": {"joints": [[0, 1, 2]]},
+    "hinges": {"hinges": [[0, 1, 2, 3]]},
     "plate_wind": {"triangles": [[0, 1, 2]]},
     "field": {"force": ["-k*x", "0.1*sin(t)", "vx*0"], "constants": {"k": 2.0}},
     "flow": {"velocity": ["-y", "x", "0.1*t"]},
     "mesh": {"mesh": [[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]]},
+    "cloth_from_mesh": {"mesh": [[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]]},
     "points": {"x": [[0.0, 1.0, 0.0], [0.5, 1.2, 0.1]]},
     "scatter": {"count": 4},
     "polygon": {"vertices": SQUARE},

@@ -10,7 +10,16 @@ from .bodies import (
     chain as chain,
 )
 from .bodies import (
+    cloth as cloth,
+)
+from .bodies import (
+    cloth_from_mesh as cloth_from_mesh,
+)
+from .bodies import (
     lattice as lattice,
+)
+from .bodies import (
+    net as net,
 )
 from .bodies import (
     points as points,
@@ -152,6 +161,9 @@ from .forces import (
 )
 from .forces import (
     Harmonic as Harmonic,
+)
+from .forces import (
+    Hinges as Hinges,
 )
 from .forces import (
     LennardJones as LennardJones,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import dist
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from pointmass.errors import InvalidInput, finite_array, number
 Floats = NDArray[np.floating[Any]]
 Ints = NDArray[np.integer[Any]]
 
+PATTERNS = ("plain", "checker", "stripes", "bands")  # of surfaces
 NEAREST, FARTHEST = 1e-12, 1e15  # from a camera to its target [m]
 
 
@@ -108,6 +109,10 @@ class Triangles:
     faces : rows of the corners, counter-clockwise seen from outside, shape (k, 3).
     color : linear RGBA for each corner that `faces` can name, shape (v, 4) or (4,).
     smooth : True: shade with the mean normal of each corner; False: each face flat.
+    uv : place of the corners of each face on the pattern, from 0 to 1 along both of its sides, shape (k, 3, 2).
+    pattern : "plain", "checker", "stripes" (side by side along u), or "bands" (one above the other along v).
+    pattern_count : fields along each side.
+    pattern_color : linear RGB of every other field, beginning with the second one; the alpha is that of `color`.
     """
 
     kind: ClassVar[str] = "triangles"
@@ -117,6 +122,10 @@ class Triangles:
     faces: Ints
     color: Floats | tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     smooth: bool = True
+    uv: Floats | None = None
+    pattern: Literal["plain", "checker", "stripes", "bands"] = "plain"
+    pattern_count: int = 8
+    pattern_color: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -16,7 +16,7 @@ from pointmass.collisions.plane import Plane
 from pointmass.colors import PALETTES, Color, blackbody, linear, palette
 from pointmass.errors import InvalidInput, about, finite_array, number, shown, unknown, whole_number
 from pointmass.forces.springs import Springs
-from pointmass.frame import Arrows, Curves, Drawable, Points, Segments, Triangles
+from pointmass.frame import PATTERNS, Arrows, Curves, Drawable, Points, Segments, Triangles
 from pointmass.laws.unary import VelocityField
 from pointmass.over_life import Curve, Gradient
 from pointmass.particles import Array, Particles
@@ -24,6 +24,7 @@ from pointmass.solvers import FunctionSystem, Midpoint
 from pointmass.system import ParticleSystem
 
 KINDS = ("solid", "glow", "smoke", "flakes", "none")  # of particles
+OF_GROUP = "particles of "
 OWN_COLOR = ("red", "green", "blue")  # attributes: linear light
 OF_PARTICLES = (  # what a group may have otherwise
     *(
@@ -38,6 +39,7 @@ OF_PARTICLES = (  # what a group may have otherwise
         "daylight",
         "shutter",
     ),
+    *("pattern", "pattern_color", "pattern_count"),
     *("size_over_life", "brightness_over_life", "opacity_over_life", "color_over_life"),
 )
 SMALLEST_FLAKE, LARGEST_FLAKE = 0.5, 1.5  # times the size
@@ -72,8 +74,14 @@ class Look:
         of what is said here of particles. Who is in several has the first.
     shutter : exposure time [s], 0 = a moment: a glowing particle is a streak as long as the way that it went meanwhile,
         and as much dimmer; a ball or a flake is smeared along its way. Films have half the time between two frames.
+    surfaces : whether the surfaces of bodies are drawn, such as cloth, in place of their particles, but for those of
+        `groups`. A group with the name of a body is the look of its surface.
+    pattern : of surfaces: "plain", "checker", or "stripes" side by side, and "bands" one above the other, in turns of
+        the particles' colour and `pattern_color`.
+    pattern_color : see there.
+    pattern_count : fields of the pattern along each side.
     springs : whether springs are drawn, as lines of `spring_width` [m] (None = 0.3% of the scene) and `spring_color`
-        (None = by family).
+        (None = by family); None = those that are not in a surface that is drawn.
     trails : length of the particles' trails [s], 0 = none.
     arrows : arrows of a flow along the longest side, 0 = none.
     streamlines : integral curves of a flow, 0 = none.
@@ -99,7 +107,11 @@ class Look:
     color_over_life: Gradient | None = None
     shutter: float = 0.0
     groups: Groups | None = None
-    springs: bool = True
+    surfaces: bool = True
+    pattern: Literal["plain", "checker", "stripes", "bands"] = "plain"
+    pattern_color: Color = "#f4efe6"
+    pattern_count: int = 8
+    springs: bool | None = None
     spring_width: float | None = None
     spring_color: Color | None = None
     trails: float = 0.0
@@ -111,11 +123,9 @@ class Look:
     floor_size: float | None = None
 
     def __post_init__(self) -> None:
-        if self.particles not in KINDS:
-            raise InvalidInput(f"look.particles = {self.particles!r} is not allowed: it must be {', '.join(KINDS)}")
-        if self.palette not in PALETTES:
-            raise unknown("palette", self.palette, PALETTES)
-        for color in (self.color, self.collider_color, self.spring_color):
+        self._check_names()
+        whole_number("look.pattern_count", self.pattern_count, at_least=1)
+        for color in (self.color, self.pattern_color, self.collider_color, self.spring_color):
             if color is not None:
                 linear(color)
         for name in ("size", "spring_width", "floor_size"):
@@ -139,6 +149,13 @@ class Look:
         for name in ("arrows", "streamlines"):
             whole_number(f"look.{name}", getattr(self, name), at_least=0)
 
+    def _check_names(self) -> None:
+        if self.particles not in KINDS:
+            raise InvalidInput(f"look.particles = {self.particles!r} is not allowed: it must be {', '.join(KINDS)}")
+        for what, name, known in (("palette", self.palette, PALETTES), ("pattern", self.pattern, PATTERNS)):
+            if name not in known:
+                raise unknown(what, name, known)
+
     def described(self) -> dict[str, Any]:
         """The fields that are not at their default."""
         values = {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) != f.default}
@@ -153,20 +170,25 @@ class Look:
         extent = stage.extent
         age = np.maximum(system.particles.age - (system.t - t), 0)
         parts = self._parts(system.particles)
+        covered = self._covered(system.particles)
         result: list[Drawable] = []
         if self.colliders:
             result += [self._collider(c, k, t, extent, frame) for k, c in enumerate(system.colliders)]
         if system.order == 1 and (self.arrows or self.streamlines):
             result += self._field(system, t, stage, frame)
-        if self.springs:
-            result += self._springs(system, extent)
+        if self.surfaces:
+            result += [self._surface(name, system.particles, v, age, frame) for name in system.particles.surfaces]
+        if self.springs is not False:
+            result += self._springs(system, extent, covered)
         if self.trails > 0:
             _, _, rows = parts[-1]
             colors = self._colors(system.particles, v, age, rows)
             result += stage.trails.drawn(self, system.particles.id[rows], colors, extent, frame)
         for name, look, rows in parts:
-            if look.particles != "none" and len(rows):
-                result.append(look._particles(name, system.particles, v, age, rows, extent, frame))
+            hidden = look is self or name.removeprefix(OF_GROUP) in system.particles.surfaces
+            seen = rows[~covered[rows]] if hidden else rows
+            if look.particles != "none" and len(seen):
+                result.append(look._particles(name, system.particles, v, age, seen, extent, frame))
         return tuple(result)
 
     def _parts(self, p: Particles) -> list[tuple[str, Look, NDArray[np.intp]]]:
@@ -178,8 +200,32 @@ class Look:
                 raise unknown("group or attribute of particles in look.groups:", name, [*p.groups, *p.attributes])
             mine = rest & (p.groups[name] if name in p.groups else p.attributes[name] != 0)
             rest &= ~mine
-            parts.append((f"particles of {name}", look, np.flatnonzero(mine)))
+            parts.append((f"{OF_GROUP}{name}", look, np.flatnonzero(mine)))
         return [*parts, ("particles", self, np.flatnonzero(rest))]
+
+    def _covered(self, p: Particles) -> NDArray[np.bool_]:
+        """Who is not drawn, but the surface at whose corner it is."""
+        result = np.zeros(len(p), bool)
+        for surface in p.surfaces.values() if self.surfaces else ():
+            result[p.rows(np.unique(surface.triangles))] = True
+        return result
+
+    def _surface(self, name: str, p: Particles, v: Array, age: Array, frame: int) -> Triangles:
+        look = (self.groups or {}).get(name, self)
+        faces = p.rows(p.surfaces[name].triangles).astype(np.int32)
+        colors = look._colors(p, v, age, np.arange(int(faces.max(initial=-1)) + 1))
+        alike = not len(colors) or bool((colors == colors[0]).all())
+        color: Any = (1.0, 1.0, 1.0, 1.0) if not len(colors) else tuple(colors[0].tolist()) if alike else colors
+        return Triangles(
+            name=name,
+            version=p.version if alike else frame,
+            faces=faces,
+            color=color,
+            uv=None if look.pattern == "plain" else p.surfaces[name].uv.astype(np.float32),
+            pattern=look.pattern,
+            pattern_count=look.pattern_count,
+            pattern_color=tuple((look.brightness * linear(look.pattern_color)[:3]).tolist()),
+        )
 
     def _particles(
         self, name: str, p: Particles, v: Array, age: Array, rows: NDArray[np.intp], extent: float, frame: int
@@ -257,13 +303,17 @@ class Look:
             smooth=collider.smooth,
         )
 
-    def _springs(self, system: ParticleSystem, extent: float) -> list[Drawable]:
+    def _springs(self, system: ParticleSystem, extent: float, covered: NDArray[np.bool_]) -> list[Drawable]:
         width = self.spring_width or 0.003 * extent
         result: list[Drawable] = []
         for k, force in enumerate(system.forces):
             if isinstance(force, Springs) and len(force.ids):
                 color = linear(self.spring_color or FAMILY_COLORS.get(force.family, "#9fb4cc"))
                 pairs = force.rows(system.particles).astype(np.int32)
+                if self.springs is None:
+                    pairs = pairs[~covered[pairs].all(axis=1)]
+                if not len(pairs):
+                    continue
                 version = system.particles.version
                 result.append(
                     Segments(name=f"{force.family} {k}", version=version, pairs=pairs, width=width, color=color)

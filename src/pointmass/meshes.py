@@ -28,10 +28,12 @@ class TriangleMesh:
     ----------
     vertices : [m], shape (n, 3), no two of them at the same place.
     faces : the three vertices of each triangle, shape (k, 3), counter-clockwise seen from its outer side.
+    uv : place of each corner on a flat pattern, if the mesh has one, shape (k, 3, 2).
     """
 
     vertices: Vertices
     faces: Faces
+    uv: NDArray[np.float64] | None = None
 
     @cached_property
     def corners(self) -> NDArray[np.float64]:
@@ -106,13 +108,14 @@ def read_mesh(path: str | Path) -> TriangleMesh:
         return triangle_mesh(*_contents(file))
 
 
-def triangle_mesh(vertices: Any, faces: Any) -> TriangleMesh:
+def triangle_mesh(vertices: Any, faces: Any, uv: Any = None) -> TriangleMesh:
     """Check triangles given as arrays, and clean them in the same way as `read_mesh`.
 
     Parameters
     ----------
     vertices : [m], shape (n, 3).
     faces : three of the vertices' numbers for each triangle, shape (k, 3).
+    uv : place of each vertex on a flat pattern, shape (n, 2).
 
     Raises
     ------
@@ -121,13 +124,15 @@ def triangle_mesh(vertices: Any, faces: Any) -> TriangleMesh:
     """
     points = finite_array("vertices of a mesh", vertices, (None, 3))
     corners = _numbers(faces, len(points))
+    pattern = None if uv is None else finite_array("uv of a mesh", uv, (len(points), 2))[corners]
     points, corners = _merged(points, corners)
-    corners = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
-    corners = corners[~_flat(points[corners])]
+    solid = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    solid &= ~_flat(points[corners])
+    corners, pattern = corners[solid], None if pattern is None else pattern[solid]
     if len(corners) == 0:
         raise InvalidInput("a mesh needs at least one triangle whose area is not 0")
     used, corners = np.unique(corners, return_inverse=True)
-    return _facing_outwards(TriangleMesh(points[used], corners.reshape(-1, 3).astype(np.int64)))
+    return _facing_outwards(TriangleMesh(points[used], corners.reshape(-1, 3).astype(np.int64), pattern))
 
 
 def as_mesh(mesh: Any) -> TriangleMesh:
@@ -141,8 +146,8 @@ def as_mesh(mesh: Any) -> TriangleMesh:
     raise InvalidInput(f"a mesh must be the path of a file or a pair (vertices, faces), not {shown(mesh)}")
 
 
-def _contents(file: Path) -> tuple[Any, Any]:
-    """Vertices and faces of a file as they stand there."""
+def _contents(file: Path) -> tuple[Any, Any, Any]:
+    """Vertices, faces and, if there are any, places on the pattern of a file as they stand there."""
     import trimesh
 
     if file.suffix.lower() == ".gltf":
@@ -150,7 +155,10 @@ def _contents(file: Path) -> tuple[Any, Any]:
     found = trimesh.load(file, force="mesh", process=False)
     if not isinstance(found, trimesh.Trimesh) or len(found.faces) == 0:
         raise InvalidInput("it holds no triangles")
-    return np.asarray(found.vertices), np.asarray(found.faces)
+    uv = getattr(found.visual, "uv", None)
+    if uv is not None and np.asarray(uv).shape != (len(found.vertices), 2):
+        uv = None
+    return np.asarray(found.vertices), np.asarray(found.faces), uv
 
 
 def _numbers(faces: Any, count: int) -> Faces:
@@ -227,5 +235,11 @@ def _facing_outwards(mesh: TriangleMesh) -> TriangleMesh:
         count = np.bincount(label[:k], minlength=label.max() + 1)
         turn = count[label[:k]] < count[label[k:]]
         turn |= (count[label[:k]] == count[label[k:]]) & (label[:k] > label[k:])
-        mesh = TriangleMesh(mesh.vertices, np.where(turn[:, None], mesh.faces[:, ::-1], mesh.faces))
-    return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1]) if mesh.volume < 0 else mesh
+        mesh = _turned(mesh, turn)
+    return _turned(mesh, np.ones(len(mesh.faces), bool)) if mesh.volume < 0 else mesh
+
+
+def _turned(mesh: TriangleMesh, turn: NDArray[np.bool_]) -> TriangleMesh:
+    """The mesh with some of its triangles facing the other way."""
+    uv = None if mesh.uv is None else np.where(turn[:, None, None], mesh.uv[:, ::-1], mesh.uv)
+    return TriangleMesh(mesh.vertices, np.where(turn[:, None], mesh.faces[:, ::-1], mesh.faces), uv)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
+from dataclasses import dataclass
 from keyword import iskeyword
 from typing import Any, overload
 
@@ -95,6 +96,20 @@ def _lifetimes(name: str, value: ArrayLike, n: int) -> Array:
     return np.where(endless, np.inf, lifetime)
 
 
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles between particles: what one sees of a cloth, and what the wind blows on.
+
+    Attributes
+    ----------
+    triangles : ids of the corners, shape (k, 3).
+    uv : place of each corner on the flat pattern, from 0 to 1 along both of its sides, shape (k, 3, 2).
+    """
+
+    triangles: NDArray[np.int64]
+    uv: NDArray[np.float64]
+
+
 class Particles:
     """Point masses as columns.
 
@@ -111,6 +126,8 @@ class Particles:
         simulation notes it when the run starts, and when an emitter gives birth.
     chance : a random number in [0, 1) of each particle, by its id, shape (n,); it is only read.
     id : shape (n,), int64; never used again once a particle is gone.
+    groups : masks of particles by name; see `tag`.
+    surfaces : triangles between particles by name; see `cover`. A triangle goes when one of its corners is removed.
     version : counts changes of the structure (add, remove, pin, groups), so that what is derived from it can be kept.
 
     Parameters
@@ -145,6 +162,7 @@ class Particles:
         self.dtype = _dtype(dtype)
         self.attributes: dict[str, Array] = {}
         self.groups: dict[str, NDArray[np.bool_]] = {}
+        self.surfaces: dict[str, Surface] = {}
         self.version = 0
         self._next_id = 0
         self._chance = -1, np.zeros(0)
@@ -292,6 +310,31 @@ class Particles:
         self.groups[name] = mask
         self.version += 1
 
+    def cover(self, name: str, triangles: ArrayLike, uv: ArrayLike | None = None) -> None:
+        """Give triangles between particles a name: they are drawn as a smooth surface, and wind may blow on them.
+
+        Parameters
+        ----------
+        triangles : ids of the corners, shape (k, 3).
+        uv : place of each corner on the flat pattern, shape (k, 3, 2); 0 by default.
+
+        Raises
+        ------
+        InvalidInput
+            A corner that is no particle, another shape.
+        """
+        corners = np.asarray(triangles)
+        if corners.ndim != 2 or corners.shape[1] != 3 or corners.dtype.kind not in "iu":
+            raise InvalidInput(f"triangles of a surface must be ids of shape (k, 3), not {shown(triangles)}")
+        gone = self.rows(corners) < 0
+        if gone.any():
+            raise InvalidInput(
+                f"a triangle of surface {name!r} has the corner {corners[gone][0]}, which does not exist"
+            )
+        places = np.zeros((*corners.shape, 2)) if uv is None else finite_array("uv", uv, (len(corners), 3, 2))
+        self.surfaces[name] = Surface(corners.astype(np.int64), places)
+        self.version += 1
+
     def pin(self, which: Selection) -> None:
         """Hold particles where they are: inverse mass 0 (never a large mass), velocity 0."""
         rows = self.select(which)
@@ -350,7 +393,13 @@ class Particles:
         self.id, self._held = some(self.id), some(self._held)
         self.attributes = {name: some(values) for name, values in self.attributes.items()}
         self.groups = {name: some(values) for name, values in self.groups.items()}
+        self.surfaces = {name: self._whole(surface) for name, surface in self.surfaces.items()}
         self.version += 1
+
+    def _whole(self, surface: Surface) -> Surface:
+        """The triangles of which all corners are there."""
+        here = (self.rows(surface.triangles) >= 0).all(axis=1)
+        return Surface(surface.triangles[here], surface.uv[here])
 
     def _longer(self, name: str, column: NDArray[Any], values: NDArray[Any]) -> NDArray[Any]:
         """A column with more rows, written into the room behind it if there is some left that nobody has written to."""

@@ -100,6 +100,10 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
         str | _exactly(2, list[list[float]]),
         "the path of a file, or a list of vertices and a list of faces",
     ),
+    "Triangles": (
+        str | list[list[int]],
+        "the name of a surface, or a list of lists of particle ids, such as [[0, 1, 2]]",
+    ),
     "Vector": VECTOR,
     "Color": (str | float, "a colour, such as orange or #ffb454, or a temperature [K]"),
     "Curve": (

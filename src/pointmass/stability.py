@@ -161,11 +161,12 @@ def _linearised(system: ParticleSystem) -> Any:
         raise InvalidInput("the forces are not finite where the particles are now: there is no largest step")
     if system.order == 1:
         return matrix
-    root = np.tile(np.sqrt(np.where(np.isfinite(system.inertia), system.inertia, 1.0)), 2)
+    held = ~np.isfinite(system.inertia)
+    root, held = np.tile(np.sqrt(np.where(held, 1.0, system.inertia)), 2), np.tile(held, 2)
     entries = matrix.tocoo()
     row, column = entries.coords
     scaled = entries.data * root[row] / root[column]  # x' = v stays exactly that
-    scaled[np.isinf(np.tile(system.inertia, 2))[column]] = 0.0  # nobody feels the motion of who has none
+    scaled[held[column]] = 0.0  # who is held moves nobody, and all that moves keeps its eigenvalue
     return csr_array((scaled, (row, column)), shape=matrix.shape)
 
 

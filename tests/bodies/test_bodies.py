@@ -12,12 +12,16 @@ from pointmass.bodies import BODIES, join
 from pointmass.description import parameters_of
 from pointmass.errors import InvalidInput
 from pointmass.forces import Springs
+from tests.shapes import TETRAHEDRON
 
 EXAMPLES = {
     "points": {"x": [[0, 0, 0], [1, 2, 3]], "attributes": {"charge": [1.0, -1.0]}},
     "scatter": {"count": 12, "radius": 0.1, "radius_range": 0.05, "speed": 2.0},
     "chain": {"links": 7, "length": 2.0, "mass": 3.0},
     "lattice": {"counts": (3, 4, 5), "mass": 2.0},
+    "net": {"rows": 3, "cols": 4, "size": (1.0, 2.0), "links": 2, "pinned": "top edge"},
+    "cloth_from_mesh": {"mesh": TETRAHEDRON, "pinned": "top"},
+    "cloth": {"rows": 4, "cols": 5, "size": (1.0, 2.0), "pinned": "top corners"},
 }
 
 

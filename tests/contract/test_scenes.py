@@ -74,10 +74,11 @@ QUICK = {
     "springs": {"side": 3},
     "bounce": {"balls": 10},
     **{name: SMALL[name] for name in ("fireworks", "snow", "smoke", "dust")},
+    **{name: {"particles": 10} for name in ("cloth", "flag", "drape")},
 }
 COSTLY = {  # only so many steps
     *("balls", "rate", "links", "side", "particles", "mass", "stiffness", "steps_per_second"),
-    *("launches", "stars", "tail", "smoke", "sand", "dust"),
+    *("launches", "stars", "tail", "smoke", "sand", "dust", "stretch", "bend"),
 }
 ENDS = [
     (name, parameter["name"], value)
@@ -121,7 +122,7 @@ def test_the_ends_of_every_range(name: str, parameter: str, value: object) -> No
 def test_frames_of_a_scene_show_something(name: str) -> None:
     scene = made(name, SMALL.get(name, {})).build()
     last = frames_of(scene, 30)[-1]
-    assert {d.kind for d in last.drawables} & {"points", "segments", "curves"}
+    assert {d.kind for d in last.drawables} & {"points", "segments", "curves", "triangles"}
     for drawable in last.drawables:
         assert drawable.version >= 0
         for attribute in vars(drawable).values():

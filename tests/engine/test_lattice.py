@@ -170,3 +170,13 @@ def test_what_does_not_fit():
     assert grid(pm.ParticleSystem(system.particles, [pm.Springs([*pairs, (0, 300)])]), everybody) is None
     assert grid(pm.ParticleSystem(system.particles, [pm.Springs([*pairs, pairs[0]])]), everybody) is None
     assert grid(pm.ParticleSystem(system.particles, [pm.Gravity()]), everybody) is None
+
+
+def test_a_force_of_another_island_leaves_a_grid_a_grid():
+    """A pole beside a flag."""
+    cloth = sheet()
+    p = cloth.particles
+    ends = p.add([[5, 0, 0], [5, 1, 0]])
+    system = pm.ParticleSystem(p, [*cloth.forces, pm.Springs([ends])])
+    assert grid(system, np.arange(17 * 19)) is not None
+    pm.Simulation(system, "symplectic_euler", DT, compiled=True).prepare()

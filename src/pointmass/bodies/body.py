@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import functools
 import inspect
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ParamSpec
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pointmass.description import bind
 from pointmass.errors import InvalidInput
@@ -35,6 +37,12 @@ class Body:
     kind: str = ""
     arguments: dict[str, Any] = field(default_factory=dict)
 
+    @property
+    def triangles(self) -> NDArray[np.int64]:
+        """Ids of the corners of its surface, shape (k, 3)."""
+        surfaces = self.particles.surfaces.values()
+        return np.concatenate([np.zeros((0, 3), np.int64), *(s.triangles for s in surfaces)])
+
 
 BODIES: dict[str, Callable[..., Body]] = {}
 
@@ -57,24 +65,33 @@ def body(build: Callable[P, Body]) -> Callable[P, Body]:
 def join(bodies: Sequence[Body], names: Sequence[str], dtype: Any) -> tuple[Particles, list[Force]]:
     """One set of particles from several bodies, each a group under its name, and all their forces.
 
+    A body's own group, such as "top edge", is a group "NAME top edge"; where no other body has one of that name, also
+    "top edge". Its surface has its name.
+
     Raises
     ------
     InvalidInput
-        Two bodies of one name, or a body's own group that has the name of another's.
+        Two bodies of one name, or one that has the name of a group of another.
     """
     if len(set(names)) < len(names):
         raise InvalidInput(f"bodies need different names, not {', '.join(names)}")
     attributes = sorted({a for b in bodies for a in b.particles.attributes})
     whole = Particles(np.zeros((0, 3)), dtype=dtype, **{a: np.zeros(0) for a in attributes})
+    shared = Counter(group for b in bodies for group in b.particles.groups)
     forces: list[Force] = []
     for name, part in zip(names, bodies, strict=True):
         p, offset = part.particles, len(whole)
         whole.add(p.x, p.v, p.m, p.radius, lifetime=p.lifetime, **p.attributes)
         rows = np.arange(offset, offset + len(p))
-        for group, mask in {name: np.ones(len(p), bool), **p.groups}.items():
+        own = {f"{name} {group}": mask for group, mask in p.groups.items()}
+        own |= {group: mask for group, mask in p.groups.items() if shared[group] == 1}
+        for group, mask in {name: np.ones(len(p), bool), **own}.items():
             if group in whole.groups:
                 raise InvalidInput(f"two bodies have a group {group!r}: name one of them otherwise")
             whole.tag(group, rows[mask])
+        for surface, drawn in p.surfaces.items():
+            called = name if len(p.surfaces) == 1 else f"{name} {surface}"
+            whole.cover(called, drawn.triangles + offset, drawn.uv)
         whole.pin(rows[p.pinned])
         for force in part.forces:
             forces.append(force.shifted(offset) if isinstance(force, ElementForce) else _limited(force, rows))

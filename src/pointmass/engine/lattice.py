@@ -80,8 +80,9 @@ def grid(system: ParticleSystem, members: Rows) -> Grid | None:
         if isinstance(force, ElementForce) and force.enabled:
             rows = force.rows(system.particles)
             mine = np.flatnonzero(place[rows[:, 0]] >= 0)
-            found.append((force, place[rows[mine]], mine))
-    distances = [np.unique(abs(nodes[:, 1:] - nodes[:, :1])) for _, nodes, _ in found if len(nodes)]
+            if len(mine):  # others are those of other islands
+                found.append((force, place[rows[mine]], mine))
+    distances = [np.unique(abs(nodes[:, 1:] - nodes[:, :1])) for _, nodes, _ in found]
     if not distances or max(map(len, distances)) > 4 * FARTHEST**2:
         return None
     near = {(int(d) + k) // r for d in np.concatenate(distances) for k in (-1, 0, 1) for r in range(1, FARTHEST + 1)}

@@ -17,6 +17,7 @@ from pointmass.forces.gravity import Gravity
 from pointmass.forces.grid_files import load_grid
 from pointmass.forces.gust import Gust
 from pointmass.forces.harmonic import Harmonic
+from pointmass.forces.hinges import Hinges
 from pointmass.forces.lennard_jones import LennardJones
 from pointmass.forces.line_attractor import LineAttractor
 from pointmass.forces.magnetic import Magnetic
@@ -39,6 +40,7 @@ FORCES: dict[str, type[Force]] = {
     "quadratic_drag": QuadraticDrag,
     "springs": Springs,
     "angles": Angles,
+    "hinges": Hinges,
     "attractor": Attractor,
     "line_attractor": LineAttractor,
     "ring_attractor": RingAttractor,
@@ -79,6 +81,7 @@ __all__ = [
     "Gravity",
     "Gust",
     "Harmonic",
+    "Hinges",
     "LennardJones",
     "LineAttractor",
     "Magnetic",

@@ -6,11 +6,14 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from pointmass.errors import unknown
 from pointmass.forces.air import Air, Velocity
 from pointmass.laws.elements import ElementForce
 from pointmass.laws.parameter import Parameter, Scalar
 from pointmass.particles import Particles
 from pointmass.tracing import functions as fn
+
+Triangles = str | ArrayLike  # a surface's name, or ids
 
 
 class PlateWind(ElementForce):
@@ -22,7 +25,7 @@ class PlateWind(ElementForce):
 
     Parameters
     ----------
-    triangles : ids of the corners, shape (e, 3).
+    triangles : ids of the corners, shape (e, 3), or the name of a surface, such as that of a cloth.
     velocity : of the air at the middle of a triangle [m/s]: three numbers, formulas or functions of t; or a velocity
         field such as `Gust(...)`; or a list of both, that add up.
     density : rho of the air [kg/m^3], at least 0.
@@ -40,6 +43,7 @@ class PlateWind(ElementForce):
     Examples
     --------
     >>> pm.PlateWind([(0, 1, 2), (2, 1, 3)], velocity=(4, 0, 0))
+    >>> pm.PlateWind("cloth", velocity=pm.Gust((4, 0, 0)))
     """
 
     nodes = 3
@@ -47,7 +51,7 @@ class PlateWind(ElementForce):
 
     def __init__(
         self,
-        triangles: ArrayLike,
+        triangles: Triangles,
         velocity: Velocity = (3.0, 0.0, 0.0),
         density: Scalar = 1.2,
         drag: Scalar = 1.2,
@@ -62,7 +66,8 @@ class PlateWind(ElementForce):
             Parameter("drag", drag, at_least=0),
             Parameter("lift", lift, at_least=0),
         ]
-        super().__init__(triangles, [*parameters, *self._air.parameters], enabled)
+        self._surface = triangles if isinstance(triangles, str) else None
+        super().__init__(() if self._surface else triangles, [*parameters, *self._air.parameters], enabled)
 
     def law(self, *arguments: Any) -> Any:
         """Forces on the three corners [N]."""
@@ -79,4 +84,8 @@ class PlateWind(ElementForce):
 
     def bind(self, particles: Particles) -> None:
         self._air.bind(particles)
+        if self._surface is not None:
+            if self._surface not in particles.surfaces:
+                raise unknown("surface", self._surface, particles.surfaces)
+            self.ids = particles.surfaces[self._surface].triangles
         super().bind(particles)

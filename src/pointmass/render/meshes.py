@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from pointmass.errors import InvalidInput
 from pointmass.frame import Frame, Ints, Triangles
 from pointmass.render.camera import View
+from pointmass.render.pattern import patterned
 from pointmass.render.tables import F64, OPAQUE, Mask, Table, colors, corners, named, pixel_box
 
 COLUMNS = 30
@@ -36,7 +38,15 @@ def triangles(drawable: Triangles, frame: Frame, view: View) -> Table:
     with np.errstate(invalid="ignore"):
         keep = np.isfinite(full.sum(axis=(1, 2))) & (full[:, :, 9] > 0.0).any(axis=1)
         keep &= (normals * normals).sum(axis=1) > 0.0
-    return _project(clip(full[keep], view.near), view)
+    full = full[keep]
+    if drawable.pattern != "plain" and drawable.uv is not None:
+        uv = np.asarray(drawable.uv, dtype=np.float64)
+        if uv.shape != (len(faces), 3, 2) or not np.isfinite(uv).all():
+            raise InvalidInput(
+                f"drawable {drawable.name!r} has {len(faces)} faces, but no finite uv of shape ({len(faces)}, 3, 2)"
+            )
+        full = patterned(full, uv[keep], slice(6, 9), drawable)
+    return _project(clip(full, view.near), view)
 
 
 def face_normals(places: F64, faces: Ints) -> F64:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from pointmass.scenes.base import CheckFailed, ShippedScene
 from pointmass.scenes.bounce import Bounce
+from pointmass.scenes.cloth import ClothScene
+from pointmass.scenes.drape import Drape
 from pointmass.scenes.dust import Dust
 from pointmass.scenes.fireworks import Fireworks
+from pointmass.scenes.flag import Flag
 from pointmass.scenes.flow import FlowScene
 from pointmass.scenes.fountain import Fountain
 from pointmass.scenes.orbit import Orbit
@@ -16,7 +19,21 @@ from pointmass.scenes.springs import SpringsScene
 
 SCENES: dict[str, type[ShippedScene]] = {
     scene.name: scene
-    for scene in (Pendulum, Bounce, FlowScene, Orbit, SpringsScene, Fountain, Fireworks, Snow, Smoke, Dust)
+    for scene in (
+        Pendulum,
+        Bounce,
+        FlowScene,
+        Orbit,
+        SpringsScene,
+        Fountain,
+        Fireworks,
+        Snow,
+        Smoke,
+        Dust,
+        ClothScene,
+        Flag,
+        Drape,
+    )
 }
 
 __all__ = ["SCENES", "CheckFailed", "ShippedScene"]
