@@ -33,6 +33,7 @@ NEEDED: dict[str, dict[str, Any]] = {
     "surface_attractor": {"around": [{"type": "sphere", "radius": 0.4}]},  # what cannot be left out, by kind
     "springs": {"pairs": [[0, 1], [1, 2]]},
     "angles": {"joints": [[0, 1, 2]]},
+    "volumes": {"tetrahedra": [[0, 1, 2, 3]]},
     "plate_wind": {"triangles": [[0, 1, 2]]},
     "field": {"force": ["-k*x", "0.1*sin(t)", "vx*0"], "constants": {"k": 2.0}},
     "flow": {"velocity": ["-y", "x", "0.1*t"]},

@@ -181,6 +181,9 @@ from .forces import (
     SurfaceAttractor as SurfaceAttractor,
 )
 from .forces import (
+    Volumes as Volumes,
+)
+from .forces import (
     Vortex as Vortex,
 )
 from .forces import (

@@ -29,6 +29,7 @@ N = 6
 TIME = 0.7
 PAIRS = [(0, 1), (1, 2), (4, 2), (5, 0)]
 JOINTS = [(0, 1, 2), (3, 2, 5)]
+FOURS = [(0, 1, 2, 3), (5, 2, 4, 0)]
 RNG = np.random.default_rng(42)
 CELLS = RNG.standard_normal((2, 3, 4, 1, 3))
 CELL_PLACE = {"origin": (-2.0, -3.0, 0.0), "spacing": 1.7, "times": (0.0, 1.0)}
@@ -107,6 +108,15 @@ EXAMPLES: dict[str, list[Example]] = {
             naive.angle,
             naive.angle_energy,
             elements=JOINTS,
+        )
+    ],
+    "volumes": [
+        Example(
+            {"tetrahedra": FOURS, "k_s": [2.0, 3.0], "k_d": 0.5, "rest": "0.1 - 0.3*t"},
+            lambda e: {"k_s": (2.0, 3.0)[e], "k_d": 0.5, "rest": 0.1 - 0.3 * TIME},
+            naive.volume,
+            naive.volume_energy,
+            elements=FOURS,
         )
     ],
     "attractor": [

@@ -69,6 +69,7 @@ LAWS: dict[str, list[Callable[[], pm.Force]]] = {
     ],
     "plate_wind": [lambda: pm.PlateWind([(0, 1, 2), (2, 5, 6)], [pm.Vortex(2.0, eps=0.2), (1, "t", 0)])],
     "angles": [lambda: pm.Angles([(0, 1, 2), (2, 5, 1)], 2.0, 0.1, rest=0.5)],
+    "volumes": [lambda: pm.Volumes([(0, 1, 2, 3), (2, 5, 1, 6)], 2.0, 0.1, rest=0.5)],
     "own": [lambda: own(strength="charge"), lambda: corner(elements=[(0, 1, 2), (5, 6, 7)])],
     "flow": [
         lambda: pm.Flow(("-y", "x + 0.2*sin(t)", "0")),

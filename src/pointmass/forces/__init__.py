@@ -27,6 +27,7 @@ from pointmass.forces.ring_attractor import RingAttractor
 from pointmass.forces.soft_sphere import SoftSphere
 from pointmass.forces.springs import Springs
 from pointmass.forces.surface_attractor import SurfaceAttractor
+from pointmass.forces.volumes import Volumes
 from pointmass.forces.vortex import Vortex
 from pointmass.forces.vortex_line import VortexLine
 from pointmass.forces.vortex_ring import VortexRing
@@ -39,6 +40,7 @@ FORCES: dict[str, type[Force]] = {
     "quadratic_drag": QuadraticDrag,
     "springs": Springs,
     "angles": Angles,
+    "volumes": Volumes,
     "attractor": Attractor,
     "line_attractor": LineAttractor,
     "ring_attractor": RingAttractor,
@@ -89,6 +91,7 @@ __all__ = [
     "SoftSphere",
     "Springs",
     "SurfaceAttractor",
+    "Volumes",
     "Vortex",
     "VortexLine",
     "VortexRing",
