@@ -10,6 +10,9 @@ from .bodies import (
     chain as chain,
 )
 from .bodies import (
+    hair as hair,
+)
+from .bodies import (
     lattice as lattice,
 )
 from .bodies import (

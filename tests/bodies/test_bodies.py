@@ -18,6 +18,7 @@ EXAMPLES = {
     "scatter": {"count": 12, "radius": 0.1, "radius_range": 0.05, "speed": 2.0},
     "chain": {"links": 7, "length": 2.0, "mass": 3.0},
     "lattice": {"counts": (3, 4, 5), "mass": 2.0},
+    "hair": {"strands": 5, "points": 24, "style": "curly", "jitter": 0.05},
 }
 
 
