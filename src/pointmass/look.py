@@ -21,6 +21,7 @@ from pointmass.laws.unary import VelocityField
 from pointmass.over_life import Curve, Gradient
 from pointmass.particles import Array, Particles
 from pointmass.solvers import FunctionSystem, Midpoint
+from pointmass.strands import FAMILY, Strands
 from pointmass.system import ParticleSystem
 
 KINDS = ("solid", "glow", "smoke", "flakes", "none")  # of particles
@@ -73,7 +74,10 @@ class Look:
     shutter : exposure time [s], 0 = a moment: a glowing particle is a streak as long as the way that it went meanwhile,
         and as much dimmer; a ball or a flake is smeared along its way. Films have half the time between two frames.
     springs : whether springs are drawn, as lines of `spring_width` [m] (None = 0.3% of the scene) and `spring_color`
-        (None = by family).
+        (None = by family). Those of hair are drawn as strands, `spring_width` thick at the root.
+    strand_color, tip_color : of hair at its roots and at its tips.
+    children : strands drawn between each strand of hair and its neighbours, which are not simulated.
+    children_seed : another one gives other children.
     trails : length of the particles' trails [s], 0 = none.
     arrows : arrows of a flow along the longest side, 0 = none.
     streamlines : integral curves of a flow, 0 = none.
@@ -102,6 +106,10 @@ class Look:
     springs: bool = True
     spring_width: float | None = None
     spring_color: Color | None = None
+    strand_color: Color = "#4a2f1c"
+    tip_color: Color = "#a9713c"
+    children: int = 0
+    children_seed: int = 0
     trails: float = 0.0
     arrows: int = 0
     streamlines: int = 0
@@ -115,7 +123,7 @@ class Look:
             raise InvalidInput(f"look.particles = {self.particles!r} is not allowed: it must be {', '.join(KINDS)}")
         if self.palette not in PALETTES:
             raise unknown("palette", self.palette, PALETTES)
-        for color in (self.color, self.collider_color, self.spring_color):
+        for color in (self.color, self.collider_color, self.spring_color, self.strand_color, self.tip_color):
             if color is not None:
                 linear(color)
         for name in ("size", "spring_width", "floor_size"):
@@ -136,7 +144,7 @@ class Look:
         number("look.trails", self.trails, at_least=0, unit="s")
         if self.field_box is not None:
             finite_array("look.field_box", self.field_box, (2, 3))
-        for name in ("arrows", "streamlines"):
+        for name in ("arrows", "streamlines", "children", "children_seed"):
             whole_number(f"look.{name}", getattr(self, name), at_least=0)
 
     def described(self) -> dict[str, Any]:
@@ -159,7 +167,7 @@ class Look:
         if system.order == 1 and (self.arrows or self.streamlines):
             result += self._field(system, t, stage, frame)
         if self.springs:
-            result += self._springs(system, extent)
+            result += self._springs(system, x, stage, frame)
         if self.trails > 0:
             _, _, rows = parts[-1]
             colors = self._colors(system.particles, v, age, rows)
@@ -257,17 +265,20 @@ class Look:
             smooth=collider.smooth,
         )
 
-    def _springs(self, system: ParticleSystem, extent: float) -> list[Drawable]:
-        width = self.spring_width or 0.003 * extent
+    def _springs(self, system: ParticleSystem, x: Array, stage: Stage, frame: int) -> list[Drawable]:
+        width = self.spring_width or 0.003 * stage.extent
         result: list[Drawable] = []
         for k, force in enumerate(system.forces):
-            if isinstance(force, Springs) and len(force.ids):
-                color = linear(self.spring_color or FAMILY_COLORS.get(force.family, "#9fb4cc"))
-                pairs = force.rows(system.particles).astype(np.int32)
-                version = system.particles.version
-                result.append(
-                    Segments(name=f"{force.family} {k}", version=version, pairs=pairs, width=width, color=color)
-                )
+            if not isinstance(force, Springs) or not len(force.ids):
+                continue
+            name, p = f"{force.family} {k}", system.particles
+            if force in stage.strands:
+                ends = linear(self.strand_color), linear(self.tip_color)
+                result.append(stage.strands[force].drawn(name, p, x, width, *ends, frame))
+                continue
+            color = linear(self.spring_color or FAMILY_COLORS.get(force.family, "#9fb4cc"))
+            pairs = force.rows(p).astype(np.int32)
+            result.append(Segments(name=name, version=p.version, pairs=pairs, width=width, color=color))
         return result
 
     def _field(self, system: ParticleSystem, t: float, stage: Stage, frame: int) -> list[Drawable]:
@@ -315,14 +326,21 @@ class Stage:
     low, high : corners of the box in which fields are drawn [m].
     extent : size of the scene [m]; lines and small particles are drawn in proportion to it.
     trails : where the particles were.
+    strands : of hair, by the springs along them.
     """
 
-    def __init__(self, look: Look, x: Array) -> None:
+    def __init__(self, look: Look, system: ParticleSystem) -> None:
+        x = system.particles.x
         self.low: Array
         self.high: Array
         self.low, self.high = _bounds(x) if look.field_box is None else np.array(look.field_box, np.float64)
         self.extent = _extent(x)
         self.trails = Trails(look)
+        self.strands = {
+            force: Strands(force, system.particles, look.children, look.children_seed)
+            for force in system.forces
+            if isinstance(force, Springs) and force.family == FAMILY and len(force.ids) and look.springs
+        }
 
 
 class Trails:

@@ -120,7 +120,7 @@ class Simulation:
             warnings.warn(f"this run is not compiled, because {reason}", stacklevel=2)
         self._lineage = Lineage(self.emitters, self.zones)
         self._start = system.get_state()
-        self._stage = Stage(self.look, system.particles.x)
+        self._stage = Stage(self.look, system)
         self._looks = self.t0, 0, 1.0  # time of a frame, how many were looked at from it on, and how many in a second
         p = system.particles
         self._deaths = Deaths()
