@@ -171,6 +171,19 @@ def formula_energy(x, v, m, t, function, energy):
     return energy(x, v, m, t)
 
 
+def cushion(x, v, m, t, solids, k_s, thickness, damping):
+    parts = []
+    for distance, normal in solids(x):
+        if distance < thickness:
+            push = k_s * (thickness - distance) * max(1 - damping * dot(v, normal), 0)
+            parts.append(scale(push, normal))
+    return [sum(part[k] for part in parts) for k in range(3)]
+
+
+def cushion_energy(x, v, m, t, solids, k_s, thickness, damping):
+    return sum(0.5 * k_s * max(thickness - distance, 0) ** 2 for distance, _ in solids(x))
+
+
 # ------------------------------------------------------------------------------------------------ elements
 
 

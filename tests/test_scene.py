@@ -31,6 +31,7 @@ VALIDATOR = jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text()))
 SQUARE = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]]
 NEEDED: dict[str, dict[str, Any]] = {
     "surface_attractor": {"around": [{"type": "sphere", "radius": 0.4}]},  # what cannot be left out, by kind
+    "cushion": {"around": [{"type": "sphere", "radius": 0.4}]},
     "springs": {"pairs": [[0, 1], [1, 2]]},
     "angles": {"joints": [[0, 1, 2]]},
     "volumes": {"tetrahedra": [[0, 1, 2, 3]]},

@@ -124,6 +124,9 @@ from .forces import (
     CurlNoise as CurlNoise,
 )
 from .forces import (
+    Cushion as Cushion,
+)
+from .forces import (
     Diffusion as Diffusion,
 )
 from .forces import (

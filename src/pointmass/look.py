@@ -78,6 +78,7 @@ class Look:
     strand_color, tip_color : of hair at its roots and at its tips.
     children : strands drawn between each strand of hair and its neighbours, which are not simulated.
     children_seed : another one gives other children.
+    clump : how far children draw near to their strand from root to tip, 0 to 1: curls then keep their shape.
     trails : length of the particles' trails [s], 0 = none.
     arrows : arrows of a flow along the longest side, 0 = none.
     streamlines : integral curves of a flow, 0 = none.
@@ -110,6 +111,7 @@ class Look:
     tip_color: Color = "#a9713c"
     children: int = 0
     children_seed: int = 0
+    clump: float = 0.0
     trails: float = 0.0
     arrows: int = 0
     streamlines: int = 0
@@ -131,6 +133,7 @@ class Look:
                 number(f"look.{name}", getattr(self, name), above=0, unit="m")
         number("look.brightness", self.brightness, at_least=0)
         number("look.opacity", self.opacity, at_least=0, at_most=1)
+        number("look.clump", self.clump, at_least=0, at_most=1)
         number("look.daylight", self.daylight, at_least=0)
         number("look.shutter", self.shutter, at_least=0, unit="s")
         for name, most in (("size_over_life", None), ("brightness_over_life", None), ("opacity_over_life", 1.0)):
@@ -337,7 +340,7 @@ class Stage:
         self.extent = _extent(x)
         self.trails = Trails(look)
         self.strands = {
-            force: Strands(force, system.particles, look.children, look.children_seed)
+            force: Strands(force, system.particles, look.children, look.clump, look.children_seed)
             for force in system.forces
             if isinstance(force, Springs) and force.family == FAMILY and len(force.ids) and look.springs
         }

@@ -29,12 +29,13 @@ class Strands:
     ----------
     force : springs of the family "strand", from each root to its tip, strand by strand.
     particles : as they are at the start.
+    clump : how far children draw near to the one that has them, from not at all at the root to this at the tip, 0 to 1.
     children : of each strand. There are none of fewer than three strands, or of strands that are not alike, as when a
         particle was taken away.
     """
 
-    def __init__(self, force: Springs, particles: Particles, children: int, seed: int) -> None:
-        self.force, self.seed = force, seed
+    def __init__(self, force: Springs, particles: Particles, children: int, clump: float, seed: int) -> None:
+        self.force, self.clump, self.seed = force, clump, seed
         self.parents: Rows = np.zeros((0, 3), np.intp)
         self.weights: Array = np.zeros((0, 3))
         self._links = len(force.ids)
@@ -60,8 +61,12 @@ class Strands:
         points = x[rows].astype(np.float32)
         if counts.sum() > len(rows):
             strands = points.reshape(-1, counts[0], 3)
-            children = [strands[self.parents[:, k]] * self.weights[:, k, None, None] for k in range(3)]
-            points = np.concatenate([points, (children[0] + children[1] + children[2]).reshape(-1, 3)])
+            near = self.clump * np.linspace(0, 1, counts[0])
+            near = np.asarray(near * (2 * self.clump - near) / (self.clump or 1))
+            first, second, third = (w[:, None] * (1 - near) for w in self.weights.T)
+            parts = zip((first + near, second, third), self.parents.T, strict=True)
+            children = sum(weight[:, :, None] * strands[parent] for weight, parent in parts)
+            points = np.concatenate([points, np.reshape(children, (-1, 3))])
         offsets = np.append(0, np.cumsum(counts))
         within = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
         along = (within / np.repeat(counts - 1, counts)).astype(np.float32)

@@ -82,7 +82,9 @@ def test_a_curl_is_a_helix(turns: float) -> None:
 
 
 def test_combing_changes_the_start_and_not_the_rest() -> None:
-    loose, combed = (pm.hair(40, 16, 0.2, style="wavy", curl_turns=10.0, comb=c, cap=100.0) for c in (0.0, 25.0))
+    loose, combed = (
+        pm.hair(40, 16, 0.2, style="wavy", curl_turns=10.0, comb=(0, c, 0), cap=100.0) for c in (0.0, -25.0)
+    )
     for a, b in zip(loose.forces, combed.forces, strict=True):
         for name in a.parameters:
             np.testing.assert_array_equal(
@@ -119,7 +121,7 @@ def test_given_curves_stay_as_they_are() -> None:
         ({"crown": (0, 0, 0)}, "crown"),
         ({"curves": [[[0, 0, 0], [1, 0, 0]]]}, "at least 1 strand of 3 points"),
         ({"curves": [[[0, 0, 0], [1, 0, 0], [1, 0, 0]]]}, "points 1 and 2 of strand 0 of curves are the same"),
-        ({"curves": [[[0, 0, 0], [1, 0, 0], [2, 0, 0]]], "comb": 1.0}, "leave out mesh and comb"),
+        ({"curves": [[[0, 0, 0], [1, 0, 0], [2, 0, 0]]], "comb": (0, -1, 0)}, "leave out mesh and comb"),
         ({"mesh": "hair.txt"}, "mesh file"),
     ],
 )

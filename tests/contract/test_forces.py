@@ -209,6 +209,29 @@ EXAMPLES: dict[str, list[Example]] = {
             text=False,
         ),
     ],
+    "cushion": [
+        Example(
+            {
+                "around": [Sphere((0.2, 0, 0), 0.5), Plane(("0.1*t", -1, 0))],
+                "k_s": 3.0,
+                "thickness": "1 + 0.2*t",
+                "damping": 0.7,
+            },
+            lambda i: {
+                "solids": lambda x: [
+                    (
+                        naive.norm(naive.sub(x, (0.2, 0, 0))) - 0.5,
+                        naive.scale(1 / naive.norm(naive.sub(x, (0.2, 0, 0))), naive.sub(x, (0.2, 0, 0))),
+                    ),
+                    (x[1] + 1, (0, 1, 0)),
+                ],
+                **{"k_s": 3.0, "thickness": 1 + 0.2 * TIME, "damping": 0.7},
+            },
+            naive.cushion,
+            naive.cushion_energy,
+            text=False,
+        )
+    ],
     "harmonic": [
         Example(
             {"k_s": 4.0, "center": ("cos(t)", 0, 1), "k_d": 0.2},

@@ -49,7 +49,7 @@ def hair(
     crown: Any = (0.0, 1.0, 0.0),
     mesh: TriangleSource | None = None,
     curves: Any = None,
-    comb: float = 0.0,
+    comb: Any = (0.0, 0.0, 0.0),
     thickness: float = 8e-5,
     density: float = 1300.0,
     bend: float | None = None,
@@ -79,7 +79,8 @@ def hair(
     crown : direction of the middle of the hair on the sphere.
     mesh : they grow evenly from its triangles instead, along the normals: a path, or a pair (vertices, faces).
     curves : the strands themselves, shape (strands, points, 3) [m], root first, instead of all that is said above.
-    comb : how quickly strands turn downwards at the start [1/m], around the scalp. Their shape at rest stays.
+    comb : the direction to which strands turn from root to tip at the start, around the scalp, as a vector whose length
+        says how quickly [1/m], such as (0, -20, -5). Their shape at rest stays.
     thickness : diameter of a hair [m].
     density : [kg/m^3].
     bend : bending stiffness EI [N m^2]; None = that of human hair, E pi r^4 / 4 with E = 3 GPa.
@@ -104,13 +105,14 @@ def hair(
 
     Examples
     --------
-    >>> wig = pm.hair(strands=500, points=24, style="wavy", comb=20.0)
+    >>> wig = pm.hair(strands=500, points=24, style="wavy", comb=(0, -20, 0))
     """
     ratio = number("damping_ratio", damping_ratio, at_least=0)
+    combed = finite_array("comb", comb, (3,))
     r = 0.5 * number("thickness", thickness, above=0, unit="m")
     line_mass = number("density", density, above=0, unit="kg/m^3") * math.pi * r * r
     if curves is not None:
-        if mesh is not None or comb != 0:
+        if mesh is not None or combed.any():
             raise InvalidInput("curves are strands as they are: leave out mesh and comb")
         start = finite_array("curves", curves, (None, None, 3))
         rest = _edges_of_curves(start)
@@ -131,7 +133,7 @@ def hair(
         slants = jitter * (2 * random.uniform(seed, "hair", np.arange(strands), "slant") - 1)
         frames = _frames(normals, slants)
         clear = 0.0 if mesh is not None else size + 2 * float(np.abs(rest[..., :2]).max())
-        edges = _combed(rest, roots, frames, number("comb", comb, at_least=0, unit="1/m"), middle, clear)
+        edges = _combed(rest, roots, frames, combed, middle, clear)
         start = np.concatenate([roots[:, None], roots[:, None] + np.cumsum(edges, axis=1)], axis=1)
     links = np.linalg.norm(rest, axis=2)
     mass = line_mass * links.mean(axis=1, keepdims=True)
@@ -279,13 +281,13 @@ def _frames(normals: Array, slants: Array) -> Array:
     return np.stack([across, np.cross(grown, across), grown], axis=1)
 
 
-def _combed(rest: Array, roots: Array, frames: Array, comb: float, center: Array, clear: float) -> Array:
-    """Links that turn downwards from root to tip, and go around a sphere of the radius `clear`, as long as at rest."""
+def _combed(rest: Array, roots: Array, frames: Array, comb: Array, center: Array, clear: float) -> Array:
+    """Links that turn to a direction from root to tip, around a sphere of the radius `clear`; as long as at rest."""
     place, frame, result = roots, frames, []
     for k in range(rest.shape[1]):
         edge = rest[:, k]
-        if comb > 0 and k > 0:
-            way = frame[:, 2] + comb * np.linalg.norm(edge, axis=1, keepdims=True) * np.array([0.0, -1.0, 0.0])
+        if k > 0 and comb.any():
+            way = frame[:, 2] + comb * np.linalg.norm(edge, axis=1, keepdims=True)
             frame = _turned(frame, _around(_unit(way), place - center, edge[:, 2:], clear))
         step = _sum(*((edge[:, a], frame[:, a]) for a in range(3)))
         result.append(step)

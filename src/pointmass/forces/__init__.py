@@ -7,6 +7,7 @@ from pointmass.forces.angles import Angles
 from pointmass.forces.attractor import Attractor
 from pointmass.forces.buoyancy import Buoyancy
 from pointmass.forces.curl_noise import CurlNoise
+from pointmass.forces.cushion import Cushion
 from pointmass.forces.diffusion import Diffusion
 from pointmass.forces.drag import Drag
 from pointmass.forces.field import Field
@@ -45,6 +46,7 @@ FORCES: dict[str, type[Force]] = {
     "line_attractor": LineAttractor,
     "ring_attractor": RingAttractor,
     "surface_attractor": SurfaceAttractor,
+    "cushion": Cushion,
     "harmonic": Harmonic,
     "gravitation": Gravitation,
     "lennard_jones": LennardJones,
@@ -71,6 +73,7 @@ __all__ = [
     "Attractor",
     "Buoyancy",
     "CurlNoise",
+    "Cushion",
     "Diffusion",
     "Drag",
     "Field",
