@@ -252,6 +252,12 @@ from .laws.unary import (
 from .look import (
     Look as Look,
 )
+from .motions import (
+    MOTIONS as MOTIONS,
+)
+from .motions import (
+    RigidMotion as RigidMotion,
+)
 from .particles import (
     Particles as Particles,
 )
