@@ -171,6 +171,19 @@ def formula_energy(x, v, m, t, function, energy):
     return energy(x, v, m, t)
 
 
+def cushion(x, v, m, t, solids, k_s, thickness, damping):
+    parts = []
+    for distance, normal in solids(x):
+        if distance < thickness:
+            push = k_s * (thickness - distance) * max(1 - damping * dot(v, normal), 0)
+            parts.append(scale(push, normal))
+    return [sum(part[k] for part in parts) for k in range(3)]
+
+
+def cushion_energy(x, v, m, t, solids, k_s, thickness, damping):
+    return sum(0.5 * k_s * max(thickness - distance, 0) ** 2 for distance, _ in solids(x))
+
+
 # ------------------------------------------------------------------------------------------------ elements
 
 
@@ -240,6 +253,24 @@ def hinge(x, v, k_s, k_d, rest):
 
 def hinge_energy(x, k_s, k_d, rest):
     return 0.5 * k_s * (hinge_angle(x) - rest) ** 2
+
+
+def tetrahedron(x):
+    """Six times the volume: the determinant, written out."""
+    a, b, c = (sub(x[k], x[3]) for k in range(3))
+    plus = a[0] * b[1] * c[2] + a[1] * b[2] * c[0] + a[2] * b[0] * c[1]
+    return -(plus - a[2] * b[1] * c[0] - a[1] * b[0] * c[2] - a[0] * b[2] * c[1])
+
+
+def volume(x, v, k_s, k_d, rest):
+    slopes = [scale(1 / 6, cross(sub(x[b], x[c]), sub(x[a], x[c]))) for a, b, c in ((1, 2, 3), (0, 3, 2), (0, 1, 3))]
+    slopes.append([-sum(s[k] for s in slopes) for k in range(3)])
+    rate = sum(dot(slope, u) for slope, u in zip(slopes, v, strict=True))
+    return [scale(-k_s * (tetrahedron(x) / 6 - rest) - k_d * rate, slope) for slope in slopes]
+
+
+def volume_energy(x, k_s, k_d, rest):
+    return 0.5 * k_s * (tetrahedron(x) / 6 - rest) ** 2
 
 
 # ------------------------------------------------------------------------------------------------ pairs

@@ -12,4 +12,5 @@ SMALL: dict[str, dict[str, object]] = {  # fewer particles where the default tak
     "cloth": {"particles": 20},
     "flag": {"particles": 20},
     "drape": {"particles": 20},
+    "hair": {"strands": 40, "children": 2},
 }

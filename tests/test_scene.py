@@ -31,9 +31,11 @@ VALIDATOR = jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text()))
 SQUARE = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]]
 NEEDED: dict[str, dict[str, Any]] = {
     "surface_attractor": {"around": [{"type": "sphere", "radius": 0.4}]},  # what cannot be left out, by kind
+    "cushion": {"around": [{"type": "sphere", "radius": 0.4}]},
     "springs": {"pairs": [[0, 1], [1, 2]]},
     "angles": {"joints": [[0, 1, 2]]},
     "hinges": {"hinges": [[0, 1, 2, 3]]},
+    "volumes": {"tetrahedra": [[0, 1, 2, 3]]},
     "plate_wind": {"triangles": [[0, 1, 2]]},
     "field": {"force": ["-k*x", "0.1*sin(t)", "vx*0"], "constants": {"k": 2.0}},
     "flow": {"velocity": ["-y", "x", "0.1*t"]},
@@ -84,6 +86,8 @@ def scene_with(what: str, table: dict[str, Any]) -> dict[str, Any]:
     order = getattr(kind, "order", 2)
     if order == 2:
         base["forces"] = [{"type": "drag", "k": 0.1}]
+    if what == "motions":
+        base["bodies"] = [{**body, "pinned": [0]} for body in base["bodies"]]
     base[what] = [*base.get(what, []), table]
     return base
 

@@ -16,6 +16,9 @@ from .bodies import (
     cloth_from_mesh as cloth_from_mesh,
 )
 from .bodies import (
+    hair as hair,
+)
+from .bodies import (
     lattice as lattice,
 )
 from .bodies import (
@@ -133,6 +136,9 @@ from .forces import (
     CurlNoise as CurlNoise,
 )
 from .forces import (
+    Cushion as Cushion,
+)
+from .forces import (
     Diffusion as Diffusion,
 )
 from .forces import (
@@ -196,6 +202,9 @@ from .forces import (
     SurfaceAttractor as SurfaceAttractor,
 )
 from .forces import (
+    Volumes as Volumes,
+)
+from .forces import (
     Vortex as Vortex,
 )
 from .forces import (
@@ -257,6 +266,12 @@ from .laws.unary import (
 )
 from .look import (
     Look as Look,
+)
+from .motions import (
+    MOTIONS as MOTIONS,
+)
+from .motions import (
+    RigidMotion as RigidMotion,
 )
 from .particles import (
     Particles as Particles,

@@ -21,6 +21,7 @@ from pointmass.laws.unary import VelocityField
 from pointmass.over_life import Curve, Gradient
 from pointmass.particles import Array, Particles
 from pointmass.solvers import FunctionSystem, Midpoint
+from pointmass.strands import FAMILY, Strands
 from pointmass.system import ParticleSystem
 
 KINDS = ("solid", "glow", "smoke", "flakes", "none")  # of particles
@@ -81,7 +82,12 @@ class Look:
     pattern_color : see there.
     pattern_count : fields of the pattern along each side.
     springs : whether springs are drawn, as lines of `spring_width` [m] (None = 0.3% of the scene) and `spring_color`
-        (None = by family); None = those that are not in a surface that is drawn.
+        (None = by family); None = those that are not in a surface that is drawn. Those of hair are drawn as strands,
+        `spring_width` thick at the root.
+    strand_color, tip_color : of hair at its roots and at its tips.
+    children : strands drawn between each strand of hair and its neighbours, which are not simulated.
+    children_seed : another one gives other children.
+    clump : how far children draw near to their strand from root to tip, 0 to 1: curls then keep their shape.
     trails : length of the particles' trails [s], 0 = none.
     arrows : arrows of a flow along the longest side, 0 = none.
     streamlines : integral curves of a flow, 0 = none.
@@ -114,6 +120,11 @@ class Look:
     springs: bool | None = None
     spring_width: float | None = None
     spring_color: Color | None = None
+    strand_color: Color = "#4a2f1c"
+    tip_color: Color = "#a9713c"
+    children: int = 0
+    children_seed: int = 0
+    clump: float = 0.0
     trails: float = 0.0
     arrows: int = 0
     streamlines: int = 0
@@ -125,7 +136,8 @@ class Look:
     def __post_init__(self) -> None:
         self._check_names()
         whole_number("look.pattern_count", self.pattern_count, at_least=1)
-        for color in (self.color, self.pattern_color, self.collider_color, self.spring_color):
+        strands = (self.strand_color, self.tip_color)
+        for color in (self.color, self.pattern_color, self.collider_color, self.spring_color, *strands):
             if color is not None:
                 linear(color)
         for name in ("size", "spring_width", "floor_size"):
@@ -133,6 +145,7 @@ class Look:
                 number(f"look.{name}", getattr(self, name), above=0, unit="m")
         number("look.brightness", self.brightness, at_least=0)
         number("look.opacity", self.opacity, at_least=0, at_most=1)
+        number("look.clump", self.clump, at_least=0, at_most=1)
         number("look.daylight", self.daylight, at_least=0)
         number("look.shutter", self.shutter, at_least=0, unit="s")
         for name, most in (("size_over_life", None), ("brightness_over_life", None), ("opacity_over_life", 1.0)):
@@ -146,7 +159,7 @@ class Look:
         number("look.trails", self.trails, at_least=0, unit="s")
         if self.field_box is not None:
             finite_array("look.field_box", self.field_box, (2, 3))
-        for name in ("arrows", "streamlines"):
+        for name in ("arrows", "streamlines", "children", "children_seed"):
             whole_number(f"look.{name}", getattr(self, name), at_least=0)
 
     def _check_names(self) -> None:
@@ -179,7 +192,7 @@ class Look:
         if self.surfaces:
             result += [self._surface(name, system.particles, v, age, frame) for name in system.particles.surfaces]
         if self.springs is not False:
-            result += self._springs(system, extent, covered)
+            result += self._springs(system, x, stage, covered, frame)
         if self.trails > 0:
             _, _, rows = parts[-1]
             colors = self._colors(system.particles, v, age, rows)
@@ -303,21 +316,25 @@ class Look:
             smooth=collider.smooth,
         )
 
-    def _springs(self, system: ParticleSystem, extent: float, covered: NDArray[np.bool_]) -> list[Drawable]:
-        width = self.spring_width or 0.003 * extent
+    def _springs(
+        self, system: ParticleSystem, x: Array, stage: Stage, covered: NDArray[np.bool_], frame: int
+    ) -> list[Drawable]:
+        width = self.spring_width or 0.003 * stage.extent
         result: list[Drawable] = []
         for k, force in enumerate(system.forces):
-            if isinstance(force, Springs) and len(force.ids):
-                color = linear(self.spring_color or FAMILY_COLORS.get(force.family, "#9fb4cc"))
-                pairs = force.rows(system.particles).astype(np.int32)
-                if self.springs is None:
-                    pairs = pairs[~covered[pairs].all(axis=1)]
-                if not len(pairs):
-                    continue
-                version = system.particles.version
-                result.append(
-                    Segments(name=f"{force.family} {k}", version=version, pairs=pairs, width=width, color=color)
-                )
+            if not isinstance(force, Springs) or not len(force.ids):
+                continue
+            name, p = f"{force.family} {k}", system.particles
+            if force in stage.strands:
+                ends = linear(self.strand_color), linear(self.tip_color)
+                result.append(stage.strands[force].drawn(name, p, x, width, *ends, frame))
+                continue
+            color = linear(self.spring_color or FAMILY_COLORS.get(force.family, "#9fb4cc"))
+            pairs = force.rows(p).astype(np.int32)
+            if self.springs is None:
+                pairs = pairs[~covered[pairs].all(axis=1)]
+            if len(pairs):
+                result.append(Segments(name=name, version=p.version, pairs=pairs, width=width, color=color))
         return result
 
     def _field(self, system: ParticleSystem, t: float, stage: Stage, frame: int) -> list[Drawable]:
@@ -365,14 +382,21 @@ class Stage:
     low, high : corners of the box in which fields are drawn [m].
     extent : size of the scene [m]; lines and small particles are drawn in proportion to it.
     trails : where the particles were.
+    strands : of hair, by the springs along them.
     """
 
-    def __init__(self, look: Look, x: Array) -> None:
+    def __init__(self, look: Look, system: ParticleSystem) -> None:
+        x = system.particles.x
         self.low: Array
         self.high: Array
         self.low, self.high = _bounds(x) if look.field_box is None else np.array(look.field_box, np.float64)
         self.extent = _extent(x)
         self.trails = Trails(look)
+        self.strands = {
+            force: Strands(force, system.particles, look.children, look.clump, look.children_seed)
+            for force in system.forces
+            if isinstance(force, Springs) and force.family == FAMILY and len(force.ids) and look.springs
+        }
 
 
 class Trails:

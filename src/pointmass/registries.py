@@ -9,6 +9,7 @@ from pointmass.bodies import BODIES
 from pointmass.collisions import COLLIDERS
 from pointmass.emitters import EMITTERS
 from pointmass.forces import FORCES
+from pointmass.motions import MOTIONS
 from pointmass.zones import ZONES
 
 LISTS: Mapping[str, Mapping[str, Any]] = {
@@ -17,4 +18,5 @@ LISTS: Mapping[str, Mapping[str, Any]] = {
     "colliders": COLLIDERS,
     "emitters": EMITTERS,
     "zones": ZONES,
+    "motions": MOTIONS,
 }

@@ -26,6 +26,7 @@ from pointmass.laws.force import Force
 from pointmass.laws.grid import Grid
 from pointmass.look import Look
 from pointmass.meshes import TriangleMesh
+from pointmass.motions import RigidMotion
 from pointmass.particles import Particles
 from pointmass.registries import LISTS
 from pointmass.simulation import DEFAULT_DT, Simulation
@@ -37,7 +38,10 @@ from pointmass.zones import WHEN_FULL, WhenFull, Zone
 
 VERSION = 1
 PATHS = (".grid", ".mesh", ".heights", ".distances")  # parameters that may be paths
-HOLDS: dict[str, type] = {"bodies": Body, "forces": Force, "colliders": Collider, "emitters": Emitter, "zones": Zone}
+HOLDS: dict[str, type] = {
+    **{"bodies": Body, "forces": Force, "colliders": Collider, "emitters": Emitter, "zones": Zone},
+    "motions": RigidMotion,
+}
 PLAIN = ("name", "summary", "dt", "frames", "fps", "seed", "dtype", "max_particles", "when_full")
 
 
@@ -51,6 +55,7 @@ class Scene:
     names : of the bodies; by default their kind, numbered where it occurs twice.
     forces : on all particles, after the bodies' own.
     colliders, emitters, zones : surfaces, where particles come from, and where they die.
+    motions : of pinned particles.
     solver : None = SymplecticEuler, or RK4 for a flow.
     dt : the solver's step [s].
     frames, fps : length of the run, and looks per second, where nothing else is asked for.
@@ -83,6 +88,7 @@ class Scene:
     colliders: Sequence[Collider] = ()
     emitters: Sequence[Emitter] = ()
     zones: Sequence[Zone] = ()
+    motions: Sequence[RigidMotion] = ()
     camera: Camera = field(default_factory=Camera)
     look: Look = field(default_factory=Look)
 
@@ -133,6 +139,7 @@ class Scene:
             self.dt,
             emitters=emitters,
             zones=[_again(z) for z in self.zones],
+            motions=[_again(m) for m in self.motions],
             max_particles=self.max_particles,
             when_full=self.when_full,
             look=self.look,

@@ -294,6 +294,7 @@ _LIST_DOCS = {
     "colliders": "surfaces that particles bounce off",
     "emitters": "where particles come from",
     "zones": "where particles die",
+    "motions": "of pinned particles",
 }
 
 

@@ -19,6 +19,7 @@ from pointmass.errors import Diverged, InvalidInput, UnstableStep, number, shown
 from pointmass.frame import Frame
 from pointmass.lineage import Lineage
 from pointmass.look import Look, Stage
+from pointmass.motions import RigidMotion, stage_of
 from pointmass.particles import Array
 from pointmass.solvers import as_solver
 from pointmass.solvers.advance import advance
@@ -48,6 +49,7 @@ class Simulation:
         of its own in between. How often frames are looked at changes nothing.
     emitters : where particles come from.
     zones : where particles die.
+    motions : of pinned particles.
     max_particles : how many there may be at the end of a step; None = any number.
     when_full : what happens beyond them: "no birth", first come, first served; or "oldest dies", of those that emitters
         have made.
@@ -84,6 +86,7 @@ class Simulation:
         *,
         emitters: Sequence[Emitter] = (),
         zones: Sequence[Zone] = (),
+        motions: Sequence[RigidMotion] = (),
         max_particles: int | None = None,
         when_full: WhenFull = "no birth",
         look: Look | None = None,
@@ -105,6 +108,9 @@ class Simulation:
         for zone in self.zones:
             if not isinstance(zone, Zone):
                 raise InvalidInput(f"zones must be zones, such as pm.SphereZone(), not {shown(zone)}")
+        self.motions = list(motions)
+        self._led = math.nan  # time at which they were put where they are
+        self._bind_motions()
         self.max_particles = None
         if max_particles is not None:
             self.max_particles = whole_number("max_particles", max_particles, at_least=1)
@@ -121,7 +127,7 @@ class Simulation:
             warnings.warn(f"this run is not compiled, because {reason}", stacklevel=2)
         self._lineage = Lineage(self.emitters, self.zones)
         self._start = system.get_state()
-        self._stage = Stage(self.look, system.particles.x)
+        self._stage = Stage(self.look, system)
         self._looks = self.t0, 0, 1.0  # time of a frame, how many were looked at from it on, and how many in a second
         p = system.particles
         self._deaths = Deaths()
@@ -203,6 +209,8 @@ class Simulation:
             )
         p = system.particles
         x, v = system.split(self.engine.state_at(now)) if now < self.t else (p.x, p.v)
+        if now < self.t:
+            self._put(x, v, now)
         self._stage.trails.remember(now, p.id, x)
         v = self._velocities(now, x, v)
         drawables = self.look.drawables(system, now, x, v, number, self._stage)
@@ -254,7 +262,8 @@ class Simulation:
             return
         changes = self.emitters or self._deaths or self.engine.deadly
         parents_killed = self.engine.deadly and self._lineage.followed
-        single = (changes and self.engine.coupled) or parents_killed or self.zones or self.max_particles is not None
+        single = (changes and self.engine.coupled) or parents_killed or self.max_particles is not None
+        single = single or bool(self.zones or self.motions)
         span = Span(self.t0, self.dt, self.steps, 1 if single else min(most, self.engine.longest()))
         try:
             born = self._born(span, compiled=True)
@@ -263,7 +272,9 @@ class Simulation:
             return
         old = len(self.system.particles)
         clock = self._bear(born, span.start)
+        self._lead_within(span)
         if self.engine.run(span, self._started(clock, span.start), look_inside) and self._slow_enough():
+            self._lead(span.end)
             self._age(span, clock, old)
             self.steps += span.count
             self._bury(born, span.end)
@@ -287,6 +298,7 @@ class Simulation:
             raise self._explained(error) from error
         clock = self._bear(born, span.start)
         start = self._started(clock, span.start)
+        self._lead_within(span)
         before = self.system.get_state()
         try:
             self.engine.step(span, start)
@@ -300,9 +312,39 @@ class Simulation:
             self.system.set_state(before, span.start)
             self.system.remove(np.arange(old, len(self.system.particles)))
             raise
+        self._lead(span.end)
         self._age(span, clock, old)
         self.steps += 1
         self._bury(born, span.end)
+
+    def _bind_motions(self) -> None:
+        p = self.system.particles
+        for motion in self.motions:
+            if not isinstance(motion, RigidMotion):
+                raise InvalidInput(f"motions must be motions, such as pm.RigidMotion(), not {shown(motion)}")
+            if self.system.order == 1:
+                raise InvalidInput("motions lead pinned masses, and a flow has none: give the motion to its field")
+            motion.bind(p, self.system.t)
+        led, times = np.unique(np.concatenate([[-1], *(m.ids for m in self.motions)]), return_counts=True)
+        if (times > 1).any():
+            raise InvalidInput(f"two motions lead particle {int(led[times > 1][0])}: give each motion its own")
+
+    def _lead(self, t: float) -> None:
+        """Put the pins that move where they are at time t, if they are not there: a step may begin where one ended."""
+        if t != self._led:
+            self._put(self.system.particles.x, self.system.particles.v, t)
+            self._led = t
+
+    def _lead_within(self, span: Span) -> None:
+        """Put them where the solver wants to see them in a step; it may leave them in any state."""
+        self._lead(span.start + stage_of(self.solver) * (span.end - span.start))
+        self._led = math.nan
+
+    def _put(self, x: Array, v: Array, t: float) -> None:
+        for motion in self.motions:
+            rows, led = motion.rows(self.system.particles)
+            for column, values in zip((x, v), motion.at(t), strict=True):
+                column[rows] = values[led]
 
     @property
     def _streams(self) -> list[str]:

@@ -22,6 +22,7 @@ EXAMPLES = {
     "net": {"rows": 3, "cols": 4, "size": (1.0, 2.0), "links": 2, "pinned": "top edge"},
     "cloth_from_mesh": {"mesh": TETRAHEDRON, "pinned": "top"},
     "cloth": {"rows": 4, "cols": 5, "size": (1.0, 2.0), "pinned": "top corners"},
+    "hair": {"strands": 5, "points": 24, "style": "curly", "jitter": 0.05},
 }
 
 

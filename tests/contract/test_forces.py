@@ -30,6 +30,7 @@ TIME = 0.7
 PAIRS = [(0, 1), (1, 2), (4, 2), (5, 0)]
 JOINTS = [(0, 1, 2), (3, 2, 5)]
 HINGES = [(0, 1, 2, 3), (4, 2, 5, 1)]
+FOURS = [(0, 1, 2, 3), (5, 2, 4, 0)]
 RNG = np.random.default_rng(42)
 CELLS = RNG.standard_normal((2, 3, 4, 1, 3))
 CELL_PLACE = {"origin": (-2.0, -3.0, 0.0), "spacing": 1.7, "times": (0.0, 1.0)}
@@ -117,6 +118,15 @@ EXAMPLES: dict[str, list[Example]] = {
             naive.hinge,
             naive.hinge_energy,
             elements=HINGES,
+        )
+    ],
+    "volumes": [
+        Example(
+            {"tetrahedra": FOURS, "k_s": [2.0, 3.0], "k_d": 0.5, "rest": "0.1 - 0.3*t"},
+            lambda e: {"k_s": (2.0, 3.0)[e], "k_d": 0.5, "rest": 0.1 - 0.3 * TIME},
+            naive.volume,
+            naive.volume_energy,
+            elements=FOURS,
         )
     ],
     "attractor": [
@@ -208,6 +218,29 @@ EXAMPLES: dict[str, list[Example]] = {
             naive.pull,
             text=False,
         ),
+    ],
+    "cushion": [
+        Example(
+            {
+                "around": [Sphere((0.2, 0, 0), 0.5), Plane(("0.1*t", -1, 0))],
+                "k_s": 3.0,
+                "thickness": "1 + 0.2*t",
+                "damping": 0.7,
+            },
+            lambda i: {
+                "solids": lambda x: [
+                    (
+                        naive.norm(naive.sub(x, (0.2, 0, 0))) - 0.5,
+                        naive.scale(1 / naive.norm(naive.sub(x, (0.2, 0, 0))), naive.sub(x, (0.2, 0, 0))),
+                    ),
+                    (x[1] + 1, (0, 1, 0)),
+                ],
+                **{"k_s": 3.0, "thickness": 1 + 0.2 * TIME, "damping": 0.7},
+            },
+            naive.cushion,
+            naive.cushion_energy,
+            text=False,
+        )
     ],
     "harmonic": [
         Example(

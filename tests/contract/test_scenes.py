@@ -75,10 +75,11 @@ QUICK = {
     "bounce": {"balls": 10},
     **{name: SMALL[name] for name in ("fireworks", "snow", "smoke", "dust")},
     **{name: {"particles": 10} for name in ("cloth", "flag", "drape")},
+    "hair": {"strands": 8, "points": 12, "style": "straight", "children": 0},
 }
 COSTLY = {  # only so many steps
     *("balls", "rate", "links", "side", "particles", "mass", "stiffness", "steps_per_second"),
-    *("launches", "stars", "tail", "smoke", "sand", "dust", "stretch", "bend"),
+    *("launches", "stars", "tail", "smoke", "sand", "dust", "stretch", "bend", "strands", "points", "children"),
 }
 ENDS = [
     (name, parameter["name"], value)

@@ -55,6 +55,7 @@ LAWS: dict[str, list[Callable[[], pm.Force]]] = {
     "line_attractor": [lambda: pm.LineAttractor(b=(0, "t", 1), power=1.5, reach=1.5)],
     "ring_attractor": [lambda: pm.RingAttractor(strength="charge", power=2.0)],
     "surface_attractor": [lambda: pm.SurfaceAttractor([pm.Sphere(("t", 0, 0)), pm.Plane()])],
+    "cushion": [lambda: pm.Cushion([pm.Sphere(("t", 0, 0)), pm.Plane()], 20.0, 0.5, 0.3)],
     "harmonic": [lambda: pm.Harmonic(4.0, center=("cos(t)", 0, 1), k_d=0.2)],
     "magnetic": [lambda: pm.Magnetic((0.1, 0.2, 1.0))],
     "wind": [lambda: pm.Wind(("3*sin(t)", 0, 0)), lambda: pm.Wind([pm.Vortex(2.0, eps=0.2), ("t", 1, 0)])],
@@ -70,6 +71,7 @@ LAWS: dict[str, list[Callable[[], pm.Force]]] = {
     "plate_wind": [lambda: pm.PlateWind([(0, 1, 2), (2, 5, 6)], [pm.Vortex(2.0, eps=0.2), (1, "t", 0)])],
     "angles": [lambda: pm.Angles([(0, 1, 2), (2, 5, 1)], 2.0, 0.1, rest=0.5)],
     "hinges": [lambda: pm.Hinges([(0, 1, 2, 3), (2, 5, 1, 4)], 2.0, 0.1)],
+    "volumes": [lambda: pm.Volumes([(0, 1, 2, 3), (2, 5, 1, 6)], 2.0, 0.1, rest=0.5)],
     "own": [lambda: own(strength="charge"), lambda: corner(elements=[(0, 1, 2), (5, 6, 7)])],
     "flow": [
         lambda: pm.Flow(("-y", "x + 0.2*sin(t)", "0")),

@@ -17,6 +17,7 @@ KINDS = {
     "colliders": "collider",
     "emitters": "emitter",
     "zones": "zone",
+    "motions": "motion",
     "solver": "solver",
 }
 COMMON = {  # parameters that most types have and few explain

@@ -7,6 +7,7 @@ from pointmass.forces.angles import Angles
 from pointmass.forces.attractor import Attractor
 from pointmass.forces.buoyancy import Buoyancy
 from pointmass.forces.curl_noise import CurlNoise
+from pointmass.forces.cushion import Cushion
 from pointmass.forces.diffusion import Diffusion
 from pointmass.forces.drag import Drag
 from pointmass.forces.field import Field
@@ -28,6 +29,7 @@ from pointmass.forces.ring_attractor import RingAttractor
 from pointmass.forces.soft_sphere import SoftSphere
 from pointmass.forces.springs import Springs
 from pointmass.forces.surface_attractor import SurfaceAttractor
+from pointmass.forces.volumes import Volumes
 from pointmass.forces.vortex import Vortex
 from pointmass.forces.vortex_line import VortexLine
 from pointmass.forces.vortex_ring import VortexRing
@@ -41,10 +43,12 @@ FORCES: dict[str, type[Force]] = {
     "springs": Springs,
     "angles": Angles,
     "hinges": Hinges,
+    "volumes": Volumes,
     "attractor": Attractor,
     "line_attractor": LineAttractor,
     "ring_attractor": RingAttractor,
     "surface_attractor": SurfaceAttractor,
+    "cushion": Cushion,
     "harmonic": Harmonic,
     "gravitation": Gravitation,
     "lennard_jones": LennardJones,
@@ -71,6 +75,7 @@ __all__ = [
     "Attractor",
     "Buoyancy",
     "CurlNoise",
+    "Cushion",
     "Diffusion",
     "Drag",
     "Field",
@@ -92,6 +97,7 @@ __all__ = [
     "SoftSphere",
     "Springs",
     "SurfaceAttractor",
+    "Volumes",
     "Vortex",
     "VortexLine",
     "VortexRing",

@@ -11,6 +11,7 @@ from pointmass.scenes.fireworks import Fireworks
 from pointmass.scenes.flag import Flag
 from pointmass.scenes.flow import FlowScene
 from pointmass.scenes.fountain import Fountain
+from pointmass.scenes.hair import HairScene
 from pointmass.scenes.orbit import Orbit
 from pointmass.scenes.pendulum import Pendulum
 from pointmass.scenes.smoke import Smoke
@@ -33,6 +34,7 @@ SCENES: dict[str, type[ShippedScene]] = {
         ClothScene,
         Flag,
         Drape,
+        HairScene,
     )
 }
 
