@@ -84,6 +84,8 @@ def scene_with(what: str, table: dict[str, Any]) -> dict[str, Any]:
     order = getattr(kind, "order", 2)
     if order == 2:
         base["forces"] = [{"type": "drag", "k": 0.1}]
+    if what == "motions":
+        base["bodies"] = [{**body, "pinned": [0]} for body in base["bodies"]]
     base[what] = [*base.get(what, []), table]
     return base
 

@@ -20,6 +20,7 @@ SMALL = {  # fewer particles where the default takes long; the physics is the sa
     "smoke": {"rate": 60.0},
     "bounce": {"balls": 20},
     "dust": {"sand": 400, "dust": 60.0},
+    "hair": {"strands": 40, "children": 2},
 }
 VARIANTS = [(name, SMALL.get(name, {})) for name in SCENES] + [
     ("orbit", {"kind": "kepler"}),
@@ -83,10 +84,11 @@ QUICK = {
     "springs": {"side": 3},
     "bounce": {"balls": 10},
     **{name: SMALL[name] for name in ("fireworks", "snow", "smoke", "dust")},
+    "hair": {"strands": 8, "points": 12, "style": "straight", "children": 0},
 }
 COSTLY = {  # only so many steps
     *("balls", "rate", "links", "side", "particles", "mass", "stiffness", "steps_per_second"),
-    *("launches", "stars", "tail", "smoke", "sand", "dust"),
+    *("launches", "stars", "tail", "smoke", "sand", "dust", "strands", "points", "children"),
 }
 ENDS = [
     (name, parameter["name"], value)
