@@ -97,6 +97,13 @@ def test_combing_changes_the_start_and_not_the_rest() -> None:
     assert np.linalg.norm(x, axis=2).min() > 0.09 - 1e-12
 
 
+def test_roots_lean_to_where_they_are_combed() -> None:
+    x = strands_of(pm.hair(60, 4, 0.1, jitter=0.0, comb=(0, -10, 0), lean=30.0, cap=120.0), 60)
+    out, root = x[:, 0] / 0.09, (x[:, 1] - x[:, 0]) / (0.1 / 3)
+    np.testing.assert_allclose((out * root).sum(axis=1), math.cos(math.radians(30)), rtol=1e-12)
+    assert (root[:, 1] < out[:, 1] * math.cos(math.radians(30))).all()
+
+
 def test_given_curves_stay_as_they_are() -> None:
     curves = np.random.default_rng(1).normal(size=(4, 6, 3))
     body = pm.hair(curves=curves)
@@ -116,6 +123,7 @@ def test_given_curves_stay_as_they_are() -> None:
         ({"curl_radius": 0.1, "curl_turns": 10.0}, r"give less than 0\.0\d+ m, or fewer turns"),
         ({"jitter": 1.0}, "jitter = 1.0"),
         ({"cap": 181.0}, "cap = 181.0"),
+        ({"lean": 90.0}, "lean = 90.0"),
         ({"thickness": 0.0}, "thickness = 0.0"),
         ({"bend": -1.0}, "bend = -1.0"),
         ({"crown": (0, 0, 0)}, "crown"),

@@ -30,7 +30,7 @@ GOLDEN = math.pi * (3 - math.sqrt(5))  # angle between neighbours of a sunflower
 FEWEST = 5  # links of a turn
 HANGING = 50  # weights of a strand that would double its length: it hangs 2% longer at its root
 STRAIGHT = 1e-3  # sine of an angle that is no bend
-LEAST = 0.12  # of l^3/6: a volume that changes less with the torsion is as soft as if it were this
+LEAST = 0.25  # of l^3/6: a volume that changes less with the torsion is as soft as if it were this
 
 
 @body
@@ -50,6 +50,7 @@ def hair(
     mesh: TriangleSource | None = None,
     curves: Any = None,
     comb: Any = (0.0, 0.0, 0.0),
+    lean: float = 0.0,
     thickness: float = 8e-5,
     density: float = 1300.0,
     bend: float | None = None,
@@ -81,10 +82,12 @@ def hair(
     curves : the strands themselves, shape (strands, points, 3) [m], root first, instead of all that is said above.
     comb : the direction to which strands turn from root to tip at the start, around the scalp, as a vector whose length
         says how quickly [1/m], such as (0, -20, -5). Their shape at rest stays.
+    lean : how far roots lean over to the direction of `comb` [degrees], up to 85; they are clamped like this.
     thickness : diameter of a hair [m].
     density : [kg/m^3].
     bend : bending stiffness EI [N m^2]; None = that of human hair, E pi r^4 / 4 with E = 3 GPa.
-    twist : torsional stiffness GJ [N m^2]; None = EI / 1.4, that of a round section.
+    twist : torsional stiffness GJ [N m^2]; None = EI / 1.4, that of a round section. Where joints are bent by less than
+        30 degrees it is less, as a slight bend would take very short steps to tell how it is turned.
     stretch : stiffness EA [N]; None = 50 times the weight of a strand, which so hangs 2% longer at its root. Hair has
         10,000 times as much, which nobody sees and which takes steps 100 times as short.
     damping_ratio : of each spring between masses that are free, 1 = critical.
@@ -105,7 +108,7 @@ def hair(
 
     Examples
     --------
-    >>> wig = pm.hair(strands=500, points=24, style="wavy", comb=(0, -20, 0))
+    >>> wig = pm.hair(strands=500, points=24, style="wavy", comb=(0, -20, 0), lean=45.0)
     """
     ratio = number("damping_ratio", damping_ratio, at_least=0)
     combed = finite_array("comb", comb, (3,))
@@ -131,7 +134,8 @@ def hair(
         else:
             roots, normals = _on_mesh(mesh, strands, seed)
         slants = jitter * (2 * random.uniform(seed, "hair", np.arange(strands), "slant") - 1)
-        frames = _frames(normals, slants)
+        lean = math.radians(number("lean", lean, at_least=0, at_most=85, unit="degrees"))
+        frames = _frames(_leant(normals, combed, lean), slants)
         clear = 0.0 if mesh is not None else size + 2 * float(np.abs(rest[..., :2]).max())
         edges = _combed(rest, roots, frames, combed, middle, clear)
         start = np.concatenate([roots[:, None], roots[:, None] + np.cumsum(edges, axis=1)], axis=1)
@@ -279,6 +283,12 @@ def _frames(normals: Array, slants: Array) -> Array:
     grown = _unit(normals + slants[:, :1] * across + slants[:, 1:] * other)
     across = _unit(across - (across * grown).sum(axis=1, keepdims=True) * grown)
     return np.stack([across, np.cross(grown, across), grown], axis=1)
+
+
+def _leant(normals: Array, way: Array, angle: float) -> Array:
+    """Directions that lean from the normals to another direction by an angle [rad], or as far as it goes."""
+    flat = way - (normals * way).sum(axis=1, keepdims=True) * normals
+    return np.asarray(float(fn.cos(angle)) * normals + float(fn.sin(angle)) * _unit(flat))
 
 
 def _combed(rest: Array, roots: Array, frames: Array, comb: Array, center: Array, clear: float) -> Array:

@@ -23,15 +23,15 @@ from pointmass.system import ParticleSystem
 
 Array = NDArray[np.floating[Any]]
 
-SKULL, SCALP, JAW, NECK = 0.088, 0.09, 0.056, 0.046  # radii [m]; hair roots on the scalp
-CHIN = (0.0, -0.058, 0.030)  # middle of the jaw [m]
+SKULL, SCALP, JAW, NECK = 0.088, 0.09, 0.058, 0.044  # radii [m]; hair roots on the scalp
+CHIN = (0.0, -0.050, 0.022)  # middle of the jaw [m]
 BALLS = {  # that are drawn: places and radii [m]
     "skin": [
-        *((*CHIN, JAW), (0.0, 0.0, 0.0, SKULL), (0.0, -0.022, 0.088, 0.012), (0.0, -0.032, 0.090, 0.010)),
+        *((*CHIN, JAW), (0.0, 0.0, 0.0, SKULL), (0.0, -0.024, 0.089, 0.011)),
         *((side * 0.087, -0.020, 0.0, 0.017) for side in (-1, 1)),
-        *((0.0, -0.09 - 0.008 * k, -0.012, NECK) for k in range(16)),
+        *((0.0, -0.09 - 0.004 * k, -0.012, NECK) for k in range(60)),
     ],
-    "eyes": [(side * 0.030, -0.004, 0.078, 0.0115) for side in (-1, 1)],
+    "eyes": [(side * 0.029, -0.002, 0.079, 0.0095) for side in (-1, 1)],
 }
 SOFT = 0.005  # thickness of the layer on the head that hair lies on [m]
 TONES = {
@@ -51,8 +51,8 @@ class HairScene(ShippedScene):
     name = "hair"
     presets: ClassVar[dict[str, dict[str, Any]]] = {
         "straight": {"style": "straight", "length": 0.3, "points": 20, "tone": "black", "turn": 60.0},
-        "wavy": {"style": "wavy", "length": 0.26, "points": 24, "tone": "blond", "wind": 2.0},
-        "curly": {"style": "curly", "length": 0.2, "points": 24, "tone": "red", "stiffness": 2.0},
+        "wavy": {"style": "wavy", "length": 0.26, "points": 24, "tone": "blond", "wind": 1.2},
+        "curly": {"style": "curly", "length": 0.2, "points": 24, "tone": "red", "turn": 60.0},
     }
 
     strands: int = knob(300, "strands that are simulated", low=3, high=20000)
@@ -82,7 +82,7 @@ class HairScene(ShippedScene):
             damping=1.0,
             on="hair",
         )
-        breeze = Gust((-0.6 * self.wind, 0.0, -0.8 * self.wind), intensity=0.6, length=0.4, lifetime=1.2)
+        breeze = Gust((-0.9 * self.wind, 0.0, -0.4 * self.wind), intensity=0.6, length=0.4, lifetime=1.2)
         forces = [Gravity((0.0, -self.gravity, 0.0)), Wind(breeze, k=m / self.air, on="hair"), layer]
         head = [
             points(np.array(balls)[:, :3], radius=np.array(balls)[:, 3], pinned=range(len(balls)))
@@ -143,9 +143,10 @@ class HairScene(ShippedScene):
             curl_turns=self._turns(),
             jitter=0.08,
             scalp=SCALP,
-            cap=82.0,
-            crown=(0.0, 1.0, -0.75),
-            comb=(0.0, -28.0, -10.0),
+            cap=80.0,
+            crown=(0.0, 1.0, -1.2),
+            comb=(0.0, -24.0, -10.0),
+            lean=55.0,
             bend=bend,
             stretch=self._pull(),
         )
@@ -162,10 +163,10 @@ class HairScene(ShippedScene):
         return {"straight": None, "wavy": min(12.0, most), "curly": min(16.0, most)}[self.style]
 
     def _substeps(self) -> int:
-        """Steps in a sixtieth of a second, from a few strands: half of the largest stable one, as they will bend."""
+        """Steps in a sixtieth of a second, from a few strands: with some room, as they will bend otherwise."""
         few = self._wig(4)
         safe = ParticleSystem(few.particles, few.forces).stability(SymplecticEuler()).largest_safe_dt
-        return max(8, math.ceil(1 / 60 / (0.55 * safe)))
+        return max(8, math.ceil(1 / 60 / (0.75 * safe)))
 
     def _angle_formula(self) -> str:
         turn, rate = math.radians(self.turn), 2 * math.pi / self.period
