@@ -108,6 +108,7 @@ class Simulation:
             if not isinstance(zone, Zone):
                 raise InvalidInput(f"zones must be zones, such as pm.SphereZone(), not {shown(zone)}")
         self.motions = list(motions)
+        self._led = math.nan  # time at which they were put where they are
         self._bind_motions()
         self.max_particles = None
         if max_particles is not None:
@@ -259,7 +260,7 @@ class Simulation:
             return
         old = len(self.system.particles)
         clock = self._bear(born, span.start)
-        self._lead(span.start + stage_of(self.solver) * (span.end - span.start))
+        self._lead_within(span)
         if self.engine.run(span, self._started(clock, span.start), look_inside) and self._slow_enough():
             self._lead(span.end)
             self._age(span, clock, old)
@@ -285,7 +286,7 @@ class Simulation:
             raise self._explained(error) from error
         clock = self._bear(born, span.start)
         start = self._started(clock, span.start)
-        self._lead(span.start + stage_of(self.solver) * (span.end - span.start))
+        self._lead_within(span)
         before = self.system.get_state()
         try:
             self.engine.step(span, start)
@@ -317,8 +318,15 @@ class Simulation:
             raise InvalidInput(f"two motions lead particle {int(led[times > 1][0])}: give each motion its own")
 
     def _lead(self, t: float) -> None:
-        """Put the pins that move where they are at time t."""
-        self._put(self.system.particles.x, self.system.particles.v, t)
+        """Put the pins that move where they are at time t, if they are not there: a step may begin where one ended."""
+        if t != self._led:
+            self._put(self.system.particles.x, self.system.particles.v, t)
+            self._led = t
+
+    def _lead_within(self, span: Span) -> None:
+        """Put them where the solver wants to see them in a step; it may leave them in any state."""
+        self._lead(span.start + stage_of(self.solver) * (span.end - span.start))
+        self._led = math.nan
 
     def _put(self, x: Array, v: Array, t: float) -> None:
         for motion in self.motions:

@@ -22,7 +22,7 @@ from pointmass.tracing import functions as fn
 
 Array = NDArray[np.float64]
 
-STYLES = {"straight": (0.0, 0.0), "wavy": (0.004, 12.0), "curly": (0.007, 16.0)}  # radius [m], turns per metre
+STYLES = {"straight": (0.0, 0.0), "wavy": (0.006, 10.0), "curly": (0.007, 16.0)}  # radius [m], turns per metre
 STRAND = "strand"  # family of the springs along strands, which a look draws as hair
 YOUNG = 3e9  # modulus of human hair [Pa]
 POISSON = 0.4  # its ratio: G = E / (2 (1 + nu)), and J = 2 I of a round section

@@ -36,8 +36,8 @@ BALLS = {  # that are drawn: places and radii [m]
 SOFT = 0.005  # thickness of the layer on the head that hair lies on [m]
 TONES = {
     "brown": ("#3a2213", "#9c6336"),
-    "black": ("#100d0d", "#40332d"),
-    "blond": ("#7d5c2e", "#e6c486"),
+    "black": ("#120e0e", "#57463e"),
+    "blond": ("#9a7640", "#f4deaa"),
     "red": ("#5c1e0c", "#cf6a30"),
 }
 STRETCH = 25  # times the load of a strand that would double its length: 4% at rest, twice that in a jerk
@@ -59,7 +59,7 @@ class HairScene(ShippedScene):
     points: int = knob(20, "points of a strand", low=4, high=64)
     children: int = knob(20, "strands drawn between each of them and its neighbours", low=0, high=100)
     style: str = knob("straight", "shape of a strand at rest", choices=("straight", "wavy", "curly"))
-    length: float = knob(0.24, "length of a strand", unit="m", low=0.02, high=0.5)
+    length: float = knob(0.24, "length of a strand", unit="m", low=0.08, high=0.5)
     stiffness: float = knob(1.0, "bending stiffness, that of human hair = 1", low=0, high=20)
     tone: str = knob("brown", "colour of the hair", choices=tuple(TONES))
     turn: float = knob(45.0, "how far the head turns to each side", unit="degrees", low=0, high=90)
@@ -160,7 +160,7 @@ class HairScene(ShippedScene):
     def _turns(self) -> float | None:
         """Turns per metre: those of the style, or as many as there are points for."""
         most = (self.points - 1) / (5.5 * 1.08 * self.length)
-        return {"straight": None, "wavy": min(12.0, most), "curly": min(16.0, most)}[self.style]
+        return {"straight": None, "wavy": min(10.0, most), "curly": min(16.0, most)}[self.style]
 
     def _substeps(self) -> int:
         """Steps in a sixtieth of a second, from a few strands: with some room, as they will bend otherwise."""
