@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pointmass.bodies import Body, hair, points
 from pointmass.collisions import Capsule, Sphere
-from pointmass.forces import Cushion, Gravity, Gust, Wind
+from pointmass.forces import Cushion, Flow, Gravity, Wind
 from pointmass.frame import Camera, Frame
 from pointmass.look import Look
 from pointmass.motions import RigidMotion
@@ -82,7 +82,11 @@ class HairScene(ShippedScene):
             damping=1.0,
             on="hair",
         )
-        breeze = Gust((-0.9 * self.wind, 0.0, -0.4 * self.wind), intensity=0.6, length=0.4, lifetime=1.2)
+        # Gusts that travel with the wind, by a few waves: noise in every substep takes ten times as long as the hair.
+        gust = "(1 + 0.5*sin(1.9*t)*sin(0.7*t) + 0.5*sin(9*x + 5*z + 4*t))"
+        breeze = Flow(
+            (f"-{0.9 * self.wind!r}*{gust}", f"{0.3 * self.wind!r}*sin(3.1*t)", f"-{0.4 * self.wind!r}*{gust}")
+        )
         forces = [Gravity((0.0, -self.gravity, 0.0)), Wind(breeze, k=m / self.air, on="hair"), layer]
         head = [
             points(np.array(balls)[:, :3], radius=np.array(balls)[:, 3], pinned=range(len(balls)))
