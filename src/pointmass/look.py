@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass import over_life, random
+from pointmass.bodies.hair import STRAND
 from pointmass.collisions.collider import Collider
 from pointmass.collisions.plane import Plane
 from pointmass.colors import PALETTES, Color, blackbody, linear, palette
@@ -21,7 +22,7 @@ from pointmass.laws.unary import VelocityField
 from pointmass.over_life import Curve, Gradient
 from pointmass.particles import Array, Particles
 from pointmass.solvers import FunctionSystem, Midpoint
-from pointmass.strands import FAMILY, Strands
+from pointmass.strands import Strands
 from pointmass.system import ParticleSystem
 
 KINDS = ("solid", "glow", "smoke", "flakes", "none")  # of particles
@@ -395,7 +396,7 @@ class Stage:
         self.strands = {
             force: Strands(force, system.particles, look.children, look.clump, look.children_seed)
             for force in system.forces
-            if isinstance(force, Springs) and force.family == FAMILY and len(force.ids) and look.springs
+            if isinstance(force, Springs) and force.family == STRAND and len(force.ids) and look.springs is not False
         }
 
 

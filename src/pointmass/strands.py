@@ -10,7 +10,6 @@ from pointmass.forces.springs import Springs
 from pointmass.frame import Curves
 from pointmass.particles import Array, Particles
 
-FAMILY = "strand"  # of the springs that are drawn as hair
 NEAR = 5  # neighbours of a strand, of which two are parents of a child
 UNEVEN = 0.35  # half-range of the light of strands, relative
 TIP = 0.35  # width there, relative to the root
@@ -61,8 +60,8 @@ class Strands:
         points = x[rows].astype(np.float32)
         if counts.sum() > len(rows):
             strands = points.reshape(-1, counts[0], 3)
-            near = self.clump * np.linspace(0, 1, counts[0])
-            near = np.asarray(near * (2 * self.clump - near) / (self.clump or 1))
+            along = np.linspace(0, 1, counts[0])
+            near = self.clump * along * (2 - along)
             first, second, third = (w[:, None] * (1 - near) for w in self.weights.T)
             parts = zip((first + near, second, third), self.parents.T, strict=True)
             children = sum(weight[:, :, None] * strands[parent] for weight, parent in parts)

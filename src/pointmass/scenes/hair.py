@@ -82,7 +82,7 @@ class HairScene(ShippedScene):
             damping=1.0,
             on="hair",
         )
-        # Gusts that travel with the wind, by a few waves: noise in every substep takes ten times as long as the hair.
+        # Gusts by a few waves that travel: noise in every substep takes several times as long as the hair.
         gust = "(1 + 0.5*sin(1.9*t)*sin(0.7*t) + 0.5*sin(9*x + 5*z + 4*t))"
         breeze = Flow(
             (f"-{0.9 * self.wind!r}*{gust}", f"{0.3 * self.wind!r}*sin(3.1*t)", f"-{0.4 * self.wind!r}*{gust}")
