@@ -320,6 +320,26 @@ def dust():
     shipped("dust", 300)
 
 
+def cloth_scene():
+    """The shipped scene cloth."""
+    shipped("cloth", 70)
+
+
+def flag():
+    """The shipped scene flag."""
+    shipped("flag", 80)
+
+
+def drape():
+    """The shipped scene drape."""
+    shipped("drape", 110)
+
+
+def hair():
+    """The shipped scene hair."""
+    shipped("hair", 75)
+
+
 def curl_noise():
     """Stripes of dust, carried around a ball by curl noise for a second."""
     ball = pm.Sphere(radius=0.35)
@@ -359,6 +379,10 @@ PICTURES = (
     snow_scene,
     smoke_scene,
     dust,
+    cloth_scene,
+    flag,
+    drape,
+    hair,
 )
 
 

@@ -122,7 +122,7 @@ def test_the_ends_of_every_range(name: str, parameter: str, value: object) -> No
 @pytest.mark.parametrize("name", SCENES)
 def test_frames_of_a_scene_show_something(name: str) -> None:
     scene = made(name, SMALL.get(name, {})).build()
-    last = frames_of(scene, 30)[-1]
+    last = frames_of(scene, 12)[-1]
     assert {d.kind for d in last.drawables} & {"points", "segments", "curves", "triangles"}
     for drawable in last.drawables:
         assert drawable.version >= 0
@@ -154,7 +154,7 @@ def test_scene_declares_its_parameters(name: str) -> None:
 def test_a_check_can_fail(name: str) -> None:
     """A run that was tampered with does not pass."""
     shipped = made(name, SMALL.get(name, {}))
-    frames = frames_of(shipped.build(), 40)
+    frames = frames_of(shipped.build(), 16)
     last = frames[-1]
     wrong = Frame(
         number=last.number,

@@ -58,7 +58,7 @@ def test_first_order_systems():
     system = FunctionSystem(lambda t, y: [-y[0] + t], 1)  # y = t - 1 + 2 e^-t from 1
     exact = np.array([1.0 + 2.0 * np.exp(-2.0)])
     for name, solver in SOLVERS.items():
-        if name in ("symplectic_euler", "leapfrog", "yoshida4"):
+        if name in ("symplectic_euler", "leapfrog", "yoshida4", "xpbd"):
             continue
         measured = slope(system, fixed(name), [1.0], exact, (0.05, 0.025))
         assert measured == pytest.approx(solver.order, abs=0.15), name

@@ -474,7 +474,7 @@ class IslandMembers:
             if deriv.implicit:
                 elements, found = self.families[k]
                 data += [found.nodes, family.table.array(len(elements), dtype, elements), found.ends, found.entries]
-                data += [self._colours(family, elements)] * family.coloured
+                data += [self._colours(family, elements)] if family.coloured else []
                 starts.append(found.start)
                 most.append(int(np.diff(found.start).max(initial=0)))
         for pairs in self.pairs:
