@@ -104,6 +104,17 @@ class ElementBlocks(NamedTuple):
     pull: Array
     drag: Array
 
+    def scaled(self, blocks: Array) -> Array:
+        """M^-1/2 B M^-1/2 of `pull` or `drag`, shape (e, 3 nodes, 3 nodes)."""
+        e, k = self.root.shape
+        weighed = blocks * self.root[:, :, None, None, None] * self.root[:, None, None, :, None]
+        return weighed.reshape(e, 3 * k, 3 * k)
+
+    def element(self, number: int, part: float) -> Element:
+        """One of them, which carries a part of a motion."""
+        particles = tuple(int(i) for i in self.force.ids[number])
+        return Element(self.force.name, self.force.family, number, particles, part)
+
     def of(self, vector: Array) -> Array:
         """What each element sees of a motion of all particles, shape (e, nodes, 3)."""
         return vector.reshape(-1, 3)[self.rows]
@@ -203,7 +214,7 @@ def _tables(
         name = each.force.name
         yield ElementMotions(
             force=name,
-            family=getattr(each.force, "family", name),
+            family=each.force.family,
             ids=each.force.ids.copy(),
             frequency=speed,
             damping_ratio=ratio,
@@ -235,8 +246,7 @@ def _strongest(blocks: ElementBlocks, matrices: Array) -> tuple[Array, Array]:
         weight = (both * both).sum(axis=1)
         both = both / np.sqrt(np.where(weight > 0.0, weight, 1.0))[:, None]
         return values[:, -1] * weight, both[:, :, None] * vectors[:, None, :, -1]
-    scaled = matrices * blocks.root[:, :, None, None, None] * blocks.root[:, None, None, :, None]
-    values, vectors = np.linalg.eigh(scaled.reshape(e, 3 * k, 3 * k))
+    values, vectors = np.linalg.eigh(blocks.scaled(matrices))
     return values[:, -1], vectors[:, :, -1].reshape(e, k, 3)
 
 

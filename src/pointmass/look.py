@@ -220,13 +220,13 @@ class Look:
     def _covered(self, p: Particles) -> NDArray[np.bool_]:
         """Who is not drawn, but the surface at whose corner it is."""
         result = np.zeros(len(p), bool)
-        for surface in p.surfaces.values() if self.surfaces else ():
-            result[p.rows(np.unique(surface.triangles))] = True
+        for name in p.surfaces if self.surfaces else ():
+            result[p.corners(name)] = True
         return result
 
     def _surface(self, name: str, p: Particles, v: Array, age: Array, frame: int) -> Triangles:
         look = (self.groups or {}).get(name, self)
-        faces = p.rows(p.surfaces[name].triangles).astype(np.int32)
+        faces = p.corners(name).astype(np.int32)
         colors = look._colors(p, v, age, np.arange(int(faces.max(initial=-1)) + 1))
         alike = not len(colors) or bool((colors == colors[0]).all())
         color: Any = (1.0, 1.0, 1.0, 1.0) if not len(colors) else tuple(colors[0].tolist()) if alike else colors

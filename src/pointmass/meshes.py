@@ -54,6 +54,23 @@ class TriangleMesh:
         return result
 
     @cached_property
+    def _summed(self) -> NDArray[np.float64]:
+        return np.cumsum(self.areas)
+
+    def scattered(self, u: NDArray[np.floating[Any]]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Places that are even over the surface [m], and the unit normals there, shape (k, 3) each.
+
+        Parameters
+        ----------
+        u : random numbers in [0, 1), shape (k, 3): two for the place in a triangle, one for which.
+        """
+        last = len(self._summed) - 1
+        which = np.minimum(np.searchsorted(self._summed, u[:, 2] * self._summed[-1], side="right"), last)
+        a, b, c = np.moveaxis(self.corners[which], 1, 0)
+        root, along = np.sqrt(u[:, :1]), u[:, 1:2]
+        return (1 - root) * a + root * ((1 - along) * b + along * c), self.normals[which]
+
+    @cached_property
     def edges(self) -> tuple[Faces, Faces]:
         """The edges, shape (e, 2), and for each triangle those from corner 0 to 1, 1 to 2 and 2 to 0, shape (k, 3)."""
         ends = np.sort(_sides(self.faces).reshape(-1, 2), axis=1)

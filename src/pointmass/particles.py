@@ -163,6 +163,7 @@ class Particles:
         self.attributes: dict[str, Array] = {}
         self.groups: dict[str, NDArray[np.bool_]] = {}
         self.surfaces: dict[str, Surface] = {}
+        self._corners: dict[str, tuple[int, NDArray[np.intp]]] = {}  # version and rows of those of a surface
         self.version = 0
         self._next_id = 0
         self._chance = -1, np.zeros(0)
@@ -266,7 +267,7 @@ class Particles:
     def part(self, mask: NDArray[np.bool_]) -> Particles:
         """A copy of the particles of a mask, in order; these stay as they are."""
         result = copy(self)
-        result._rooms = {}
+        result._rooms, result._corners = {}, {}
         result._take(lambda values: _some(values, mask))
         return result
 
@@ -380,9 +381,8 @@ class Particles:
         if given.size and given.dtype.kind not in "iu":
             given = np.zeros(0)
         result = given.astype(np.int64)
-        later = bool(
-            len(self) and result.size and result.min() > self.id.max()
-        )  # of most births, which takes no search
+        # Later than all others, as most births are: that takes no search.
+        later = bool(len(self) and result.size and result.min() > self.id.max())
         if result.shape != (n,) or len(np.unique(result)) != n or not (later or (self.rows(result) < 0).all()):
             raise InvalidInput(f"id must be {n} whole numbers that no other particle has")
         return result
@@ -395,6 +395,13 @@ class Particles:
         self.groups = {name: some(values) for name, values in self.groups.items()}
         self.surfaces = {name: self._whole(surface) for name, surface in self.surfaces.items()}
         self.version += 1
+
+    def corners(self, name: str) -> NDArray[np.intp]:
+        """Rows of the corners of a surface, shape (k, 3)."""
+        known = self._corners.get(name)
+        if known is None or known[0] != self.version:
+            known = self._corners[name] = self.version, self.rows(self.surfaces[name].triangles)
+        return known[1]
 
     def _whole(self, surface: Surface) -> Surface:
         """The triangles of which all corners are there."""

@@ -88,12 +88,11 @@ def stability(system: ParticleSystem, solver: Solver) -> Stability:
         A force has no Jacobian (a NumPy function that couples particles), or is not finite.
     """
     matrix = _linearised(system)
-    found = _modes(system, matrix)
+    bound, found = matrix, _modes(system, matrix)
     fast = found.values[np.abs(found.values).argmax()] if len(found.values) else 0.0
     size = float(np.abs(fast))
-    bound = matrix
     if solver.relaxes:
-        with limiting(system, solver):
+        with system.slack():
             bound = _linearised(system)
             found = _modes(system, bound)
     limit = largest_safe_step(solver, found.stiffness, found.damping)

@@ -94,9 +94,8 @@ def _product(blocks: Sequence[ElementBlocks], kind: Sequence[Array], n: int) -> 
     parts = []
     for each, matrices in zip(blocks, kind, strict=True):
         e, k = each.root.shape
-        scaled = matrices * each.root[:, :, None, None, None] * each.root[:, None, None, :, None]
         entries = (3 * each.rows[:, :, None] + np.arange(3)).reshape(e, 3 * k)
-        parts.append((scaled.reshape(e, 3 * k, 3 * k), entries))
+        parts.append((each.scaled(matrices), entries))
 
     def times(x: Array) -> Array:
         result = np.zeros(3 * n)
@@ -160,5 +159,4 @@ def _carrier(blocks: Sequence[ElementBlocks], kind: Sequence[Array], x: Array) -
         if number < len(each.rows):
             break
         number -= len(each.rows)
-    name, ids = each.force.name, tuple(int(i) for i in each.force.ids[number])
-    return Element(name, getattr(each.force, "family", name), number, ids, float(energy.max() / energy.sum()))
+    return each.element(number, float(energy.max() / energy.sum()))

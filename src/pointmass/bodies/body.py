@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.description import bind
-from pointmass.errors import InvalidInput
+from pointmass.errors import InvalidInput, unknown
 from pointmass.laws.elements import ElementForce
 from pointmass.laws.force import Force
 from pointmass.particles import Particles
@@ -60,6 +60,25 @@ def body(build: Callable[P, Body]) -> Callable[P, Body]:
     wrapper.__signature__ = inspect.signature(build)  # type: ignore[attr-defined]
     BODIES[build.__name__] = wrapper
     return wrapper
+
+
+def pin_parts(particles: Particles, pinned: Any) -> None:
+    """Pin groups by their names.
+
+    Parameters
+    ----------
+    pinned : the name of a group, a list of names, or "none".
+
+    Raises
+    ------
+    InvalidInput
+        A name of no group.
+    """
+    for name in [pinned] if isinstance(pinned, str) or not isinstance(pinned, Sequence) else pinned:
+        if name != "none" and name not in list(particles.groups):
+            raise unknown("value of pinned", name, [*particles.groups, "none"])
+        if name != "none":
+            particles.pin(name)
 
 
 def join(bodies: Sequence[Body], names: Sequence[str], dtype: Any) -> tuple[Particles, list[Force]]:

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.bodies.body import Body, body
+from pointmass.bodies.body import Body, body, pin_parts
 from pointmass.bodies.materials import made_of
-from pointmass.errors import InvalidInput, finite_array, number, unknown
-from pointmass.forces.hinges import Hinges, angles
+from pointmass.errors import InvalidInput, finite_array, number
+from pointmass.forces.hinges import Hinges
 from pointmass.forces.springs import Springs
 from pointmass.meshes import TriangleMesh, TriangleSource, as_mesh
 from pointmass.particles import Particles
@@ -87,8 +87,9 @@ def cloth_from_mesh(
         hinges = _hinges(found, inner)
         stiffness = made.bend * length[inner] ** 2 / area[inner]
         places = found.vertices[hinges]
-        rate = 2 * made.damping_ratio * np.sqrt(stiffness / _mobility(places, inverse[hinges]))
-        forces.append(Hinges(hinges, stiffness, rate, angles(places)))
+        mobility = ((Hinges.slopes(places) ** 2).sum(axis=2) * inverse[hinges]).sum(axis=1)
+        rate = 2 * made.damping_ratio * np.sqrt(stiffness / mobility)
+        forces.append(Hinges(hinges, stiffness, rate, Hinges.at(places)))
     return Body(particles, forces)
 
 
@@ -116,31 +117,6 @@ def _across(side: Ids) -> Ids:
     return 3 * (side // 3) + (side + 2 - 3 * (side // 3)) % 3
 
 
-def _mobility(places: NDArray[np.float64], inverse: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How easily the masses of each hinge change its angle, the sum of |dtheta/dx|^2 / m [1/(kg m^2)].
-
-    The gradients are those of Bridson, Marino and Fedkiw (2003).
-    """
-    a, b, c, d = places.transpose(1, 0, 2)
-    e = b - a
-    long = np.linalg.norm(e, axis=1)
-    n1, n2 = np.cross(e, c - a), np.cross(d - a, e)
-    m1, m2 = (n / (n * n).sum(axis=1)[:, None] for n in (n1, n2))
-
-    def along(p: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
-        share: NDArray[np.float64] = ((p - q) * e).sum(axis=1) / long
-        return share[:, None]
-
-    slopes = [
-        along(c, b) * m1 + along(d, b) * m2,
-        -along(c, a) * m1 - along(d, a) * m2,
-        long[:, None] * m1,
-        long[:, None] * m2,
-    ]
-    result: NDArray[np.float64] = (np.stack(slopes, axis=1) ** 2).sum(axis=2)
-    return np.asarray((result * inverse).sum(axis=1))
-
-
 def _tag(particles: Particles, border: Ids, pinned: Any) -> None:
     """Make groups of what has a name, and pin."""
     y = particles.x[:, 1]
@@ -148,12 +124,7 @@ def _tag(particles: Particles, border: Ids, pinned: Any) -> None:
     particles.tag("top", y >= y.max() - near)
     particles.tag("bottom", y <= y.min() + near)
     particles.tag("border", np.unique(border))
-    names = [pinned] if isinstance(pinned, str) else pinned
-    if isinstance(names, (list, tuple)) and all(isinstance(name, str) for name in names):
-        for name in names:
-            if name != "none" and name not in particles.groups:
-                raise unknown("value of pinned", name, [*particles.groups, "none"])
-            if name != "none":
-                particles.pin(name)
+    if isinstance(pinned, str) or (isinstance(pinned, (list, tuple)) and all(isinstance(name, str) for name in pinned)):
+        pin_parts(particles, pinned)
     else:
-        particles.pin(names)
+        particles.pin(pinned)

@@ -265,14 +265,9 @@ def _even_cap(count: int, crown: Array, cap: float) -> Array:
 
 def _on_mesh(mesh: Any, count: int, seed: int) -> tuple[Array, Array]:
     """Places on a mesh, evenly by area, and its normals there."""
-    found = as_mesh(mesh)
-    ids, area = np.arange(count), np.cumsum(found.areas)
-    which = random.uniform(seed, "hair", ids, "triangle")[:, 0] * area[-1]
-    k = np.minimum(np.searchsorted(area, which, side="right"), len(area) - 1)
-    u = random.uniform(seed, "hair", ids, "place")
-    root, along = np.sqrt(u[:, :1]), u[:, 1:]
-    a, b, c = np.moveaxis(found.corners[k], 1, 0)
-    return (1 - root) * a + root * ((1 - along) * b + along * c), found.normals[k]
+    ids = np.arange(count)
+    place, which = (random.uniform(seed, "hair", ids, name) for name in ("place", "triangle"))
+    return as_mesh(mesh).scattered(np.concatenate([place, which[:, :1]], axis=1))
 
 
 def _frames(normals: Array, slants: Array) -> Array:

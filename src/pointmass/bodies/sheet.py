@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pointmass.bodies.body import pin_parts
 from pointmass.collisions.collider import unit
-from pointmass.errors import InvalidInput, finite_array, floats, shown, unknown, whole_number
+from pointmass.errors import InvalidInput, finite_array, floats, shown, whole_number
 from pointmass.particles import Particles
 
 Ids = NDArray[np.int64]
@@ -111,14 +111,9 @@ class Sheet:
         ----------
         pinned : the name of a part, a list of names, or "none".
         """
-        parts = self.parts
-        for name, rows in parts.items():
+        for name, rows in self.parts.items():
             particles.tag(name, rows)
-        for name in [pinned] if isinstance(pinned, str) or not isinstance(pinned, Sequence) else pinned:
-            if name != "none" and name not in list(parts):
-                raise unknown("value of pinned", name, [*parts, "none"])
-            if name != "none":
-                particles.pin(name)
+        pin_parts(particles, pinned)
 
 
 def sheet(rows: Any, cols: Any, size: Any) -> Sheet:

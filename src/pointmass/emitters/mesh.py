@@ -45,11 +45,10 @@ class MeshEmitter(ShapedEmitter):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_where(self.where)
-        found = as_mesh(self.mesh)
-        self._corners, self._normals, self._area = found.corners, found.normals, np.cumsum(found.areas)
+        self._mesh = as_mesh(self.mesh)
         self._solid: Solid | None = None
         if self.where == "volume":
-            self._solid = self._inside(found)
+            self._solid = self._inside(self._mesh)
 
     def _inside(self, mesh: TriangleMesh) -> Solid:
         if not mesh.closed:
@@ -65,11 +64,7 @@ class MeshEmitter(ShapedEmitter):
         return solid
 
     def spot(self, u: Array) -> tuple[Array, Array]:
-        k = np.minimum(np.searchsorted(self._area, u[:, 3] * self._area[-1], side="right"), len(self._area) - 1)
-        a, b, c = np.moveaxis(self._corners[k], 1, 0)
-        root = np.sqrt(u[:, :1])
-        along = u[:, 1:2]
-        return (1 - root) * a + root * ((1 - along) * b + along * c), self._normals[k]
+        return self._mesh.scattered(u[:, [0, 1, 3]])
 
     def places(self, seed: int, stream: str, ids: NDArray[np.int64]) -> tuple[Array, Array]:
         if self._solid is None:

@@ -116,9 +116,8 @@ class Engine:
     @property
     def compiled(self) -> bool:
         """Whether kernels exist for all that the system is made of now."""
-        fits = self.system.order == 2 or not isinstance(
-            self.solver, (Splitting, XPBD)
-        )  # else the solver says what is wrong
+        # A solver that does not fit says so itself.
+        fits = self.system.order == 2 or not isinstance(self.solver, (Splitting, XPBD))
         return self.wanted and fits and len(self.system.particles) > 0 and not self.missing()
 
     def missing(self) -> list[str]:

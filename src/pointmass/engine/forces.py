@@ -33,6 +33,7 @@ from pointmass.tracing.trace import Traced, vector_names
 
 LANES = 64  # elements that a law is evaluated for in one go
 RECORD = 8  # numbers of a particle's state, 6 of them used: one load, and one line of the cache
+FREE = {"Q": "np.empty(9 * M[0], R)", "Qw": "np.empty(18 * M[0], R)"}  # what `projections` need
 TOTAL = 4  # numbers of a particle's force, 3 of them used
 APART = 16  # rows between what two threads write all the time
 ZERO = [f"f_{a} = R(0)" for a in "xyz"]
@@ -215,6 +216,14 @@ class Deriv:
         evaluate = [f"# {force.name}", f"if {switch} != 0 and e{j} > s{j}:", f"    status |= {pairs.call()}"]
         gather = [f"if {switch} != 0:", *(f"    f_{a} = f_{a} + F{j}[3 * g + {k}]" for k, a in enumerate("xyz"))]
         return evaluate, gather
+
+    @property
+    def projections(self) -> list[str]:
+        """Statements that find the directions in which contacts leave each particle free: 9 numbers of each in Q."""
+        if self.contact is None:
+            return []
+        project = f"project(F, K, i * {self.contact.record}, Q[9 * i:9 * i + 9], Qw[18 * i:18 * i + 18])"
+        return [f"for i in {self.loop}(n):", f"    {project}"]
 
     def _bear(self) -> list[str]:
         """Resting contact: a filter on the sum of all forces, between calculate and gather."""

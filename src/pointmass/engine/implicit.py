@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from pointmass.engine.binding import Text
 from pointmass.engine.blocks import LANES, Kind
-from pointmass.engine.forces import UNARY, Deriv, Elements
+from pointmass.engine.forces import FREE, UNARY, Deriv, Elements
 from pointmass.engine.gradients import AXES, BLOCK, SQUARE, UPPER, Gradients, read, sandwich, times
 from pointmass.engine.printing import function, indented, literal, statements
 from pointmass.engine.steps import StepText
@@ -92,7 +92,7 @@ class _Printer:
             scratch[f"{kind.name}_R"] = f"np.empty({kind.size * LANES} * M[{len(self.families) + k + 1}], R)"
         scratch |= {"U": "np.empty(18 * M[0], R)", "part": f"np.empty(M[0] // {BLOCK} + 1)"}
         work = ["gap", "load", "dv", "lack", "rate", "xs", "xt", "vs", "vt", "zx", "zv"]
-        scratch |= {"Q": "np.empty(9 * M[0], R)", "Qw": "np.empty(18 * M[0], R)"} if self.projected else {}
+        scratch |= FREE if self.projected else {}
         looks = self.deriv.binder.functions
         jacobian, own = self._jacobian()
         gradients = Gradients(self.deriv, self.solver, self.kinds, own, self.projected)
@@ -153,13 +153,7 @@ class _Printer:
             text = family.law(self.deriv)
             at_time += text.at_time
             elements += family.evaluate(self.deriv, text, "u" if self.projected else "gap")
-        first = []
-        if self.projected:
-            assert self.deriv.contact is not None
-            first = [
-                f"for i in {self.deriv.loop}(n):",
-                f"    project(F, K, i * {self.deriv.contact.record}, Q[9 * i:9 * i + 9], Qw[18 * i:18 * i + 18])",
-            ]
+        first = self.deriv.projections if self.projected else []
         if self.projected and self.linked:
             first += [f"for i in {self.deriv.loop}(n):", *indented(_projected("Q", "gap", "u"), 1)]
         timed, particle, own = self._own_blocks()

@@ -28,6 +28,7 @@ from pointmass.engine.reference import KILLED
 from pointmass.engine.relaxation import relaxation_text
 from pointmass.engine.steps import StepText, each, step_text
 from pointmass.engine.threads import spread
+from pointmass.laws.colouring import colour_starts
 from pointmass.laws.elements import ConstraintForce
 from pointmass.solvers.advance import NEARLY, SET_BACKS, Stats
 from pointmass.solvers.base import Memory, Solver
@@ -429,17 +430,16 @@ class IslandMembers:
         Those that are relaxed are ordered by colour, and then by place: a thread meets the same particles again.
         """
         if self.kernel.deriv.relaxed and isinstance(family.force, ConstraintForce):
-            colours = family.force.colours(self.kernel.system.particles)[mine]
-            by_colour = np.lexsort((self.place[nodes].min(axis=1, initial=len(self.rows)), colours))
+            by_place = self.place[nodes].min(axis=1, initial=len(self.rows))
+            by_colour = np.lexsort((by_place, self._colours(family, mine)))
             mine, nodes = mine[by_colour], nodes[by_colour]
         found = incidence(self.place[nodes], self.first)
         return mine[found.order], found
 
     def _colours(self, family: Elements, elements: Rows) -> Rows:
-        """Where each colour begins among elements in the order of their colours, and the end."""
+        """Colours of some elements, by their numbers."""
         assert isinstance(family.force, ConstraintForce)
-        colours = family.force.colours(self.kernel.system.particles)[elements]
-        return np.searchsorted(colours, np.arange(colours.max(initial=-1) + 2))
+        return family.force.colours(self.kernel.system.particles)[elements]
 
     def _layout(self, kind: Kind) -> Layout:
         """Where the blocks of a matrix are."""
@@ -474,7 +474,7 @@ class IslandMembers:
             if deriv.implicit:
                 elements, found = self.families[k]
                 data += [found.nodes, family.table.array(len(elements), dtype, elements), found.ends, found.entries]
-                data += [self._colours(family, elements)] if family.coloured else []
+                data += [colour_starts(self._colours(family, elements))] if family.coloured else []
                 starts.append(found.start)
                 most.append(int(np.diff(found.start).max(initial=0)))
         for pairs in self.pairs:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pointmass.engine.binding import Binder, Table
-from pointmass.engine.contact import ContactText
+from pointmass.engine.contact import ClearLines, ContactText
 from pointmass.engine.forces import unary
 from pointmass.engine.island import NO_STEP
 from pointmass.engine.printing import function, indented, literal
@@ -93,6 +93,11 @@ class Motion:
         values = self.state("x1", "v1") if end else self.state("x", "v")
         values += ["R(0)"] * (6 - len(values))
         return [f"{name}{end} = {value}" for name, value in zip("xyzuvw", values, strict=True)]
+
+    def watched(self, clear: ClearLines) -> list[str]:
+        """Statements that look whether a step comes near a surface."""
+        third = f"third = hr * {literal(1 / 3, self.dtype)}"
+        return [third, *self.path(0), *self.path(1), *clear.lane]
 
     def _free(self, value: str) -> str:
         """A value that is 0 for pinned particles."""
@@ -254,15 +259,15 @@ class Flight:
         else:
             clear = self.contact.clear_lines(motion.dtype, "F")
             once = [f"o = {self.pulled.record}", f"radius = {binder.attribute('radius', LANE)}", *clear.once]
-            third = f"third = hr * {literal(1 / 3, motion.dtype)}"
-            path = [*motion.path(0), *clear.begin, *motion.path(1), *clear.lane, *clear.end]
             pinned = "(not free) or " if motion.pins else ""
             step = [
                 *["t0 = began"] * bool(clear.step),
                 *trial,
-                third,
                 *clear.step,
-                *path,
+                *motion.path(0),
+                *clear.begin,
+                *motion.watched(clear),
+                *clear.end,
                 f"if {pinned}({clear.result}):",
                 *indented(motion.arrived(), 1),
                 "else:",

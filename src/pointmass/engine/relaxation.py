@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pointmass.engine.forces import LANES, Deriv, Elements
+from pointmass.engine.forces import FREE, LANES, Deriv, Elements
 from pointmass.engine.printing import function, indented
 from pointmass.engine.steps import StepText, each
 from pointmass.laws.elements import ConstraintForce
@@ -25,16 +25,11 @@ def relaxation_text(deriv: Deriv, solver: XPBD) -> StepText:
     families = [_Family(deriv, f, k) for k, f in enumerate(deriv.families) if isinstance(f.force, ConstraintForce)]
     scratch = {f"noted{f.number}": f"np.empty(M[{f.place + 1}], R)" for f in families}
     if deriv.contact is not None:
-        scratch |= {"Q": "np.empty(9 * M[0], R)", "Qw": "np.empty(18 * M[0], R)"}
+        scratch |= FREE
     if deriv.parallel and families:
         scratch["chunk"] = f"np.zeros((M[-1], {LANES * max(f.columns for f in families)}), R)"
     w = deriv.binder.attribute("w", "np.uintp(base + i)")
-    lines = ["elastic = False", "status |= DERIV(t, x, v, kv)", "elastic = True"]
-    if deriv.contact is not None:
-        lines += [
-            f"for i in {deriv.loop}(n):",
-            f"    project(F, K, i * {deriv.contact.record}, Q[9 * i:9 * i + 9], Qw[18 * i:18 * i + 18])",
-        ]
+    lines = ["elastic = False", "status |= DERIV(t, x, v, kv)", "elastic = True", *deriv.projections]
     way = "way[q] = hr * (v1[q] if free else R(0))"
     lines += each(deriv.loop, w, ["v1[q] = v[q] + hr * kv[q]", way, "rise[q] = way[q]"])
     for f in families:

@@ -19,7 +19,7 @@ from pointmass.engine.contact import ClearLines
 from pointmass.engine.island import NOT_FINITE, Outcome, Span, entry_text, marked
 from pointmass.engine.motion import LANE, STATE, Flight, Lanes, Motion, W
 from pointmass.engine.phases import REACHED
-from pointmass.engine.printing import function, indented, literal
+from pointmass.engine.printing import function, indented
 from pointmass.engine.reference import KILLED
 from pointmass.engine.threads import spread
 from pointmass.solvers.advance import Stats
@@ -122,8 +122,7 @@ class SinglesKernel:
         clear = None if self.contact is None else self.contact.clear_lines(motion.dtype, "F")
         step = [*motion.lines]
         if clear is not None:
-            third = f"third = hr * {literal(1 / 3, motion.dtype)}"
-            step += [third, *motion.path(0), *motion.path(1), *clear.lane]
+            step += motion.watched(clear)
         step += motion.arrived()
         timed = motion.timed or (clear is not None and bool(clear.step))
         long = timed or len(step) > LONG or bool(motion.binder.functions)  # functions are longer than they look

@@ -26,6 +26,7 @@ class Angles(ConstraintForce):
     """
 
     nodes = 3
+    unit = "rad"
 
     def __init__(
         self, joints: ArrayLike, k_s: Scalar = 1.0, k_d: Scalar = 0.0, rest: Scalar = 0.0, *, enabled: bool = True

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from pointmass.laws.elements import ConstraintForce
 from pointmass.laws.parameter import Parameter, Scalar
-from pointmass.particles import Particles
 from pointmass.tracing import functions as fn
 
 
@@ -37,6 +35,7 @@ class Hinges(ConstraintForce):
     """
 
     nodes = 4
+    unit = "rad"
 
     def __init__(
         self,
@@ -62,17 +61,3 @@ class Hinges(ConstraintForce):
         e = fn.sub(b, a)
         n1, n2 = fn.cross(e, fn.sub(c, a)), fn.cross(fn.sub(d, a), e)
         return fn.atan2(fn.dot(fn.cross(n2, n1), e) * fn.inverse(fn.length(e)), fn.dot(n1, n2))
-
-    def bind(self, particles: Particles) -> None:
-        """Measure rest angles where none were given, and check the corners."""
-        if "rest" not in self.parameters:
-            corners = particles.x[self.found(particles)].astype(np.float64)
-            self.parameters["rest"] = Parameter("rest", angles(corners), unit="rad")
-        super().bind(particles)
-
-
-def angles(corners: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """theta of hinges whose corners a, b, c, d are given, shape (e, 4, 3)."""
-    columns = [tuple(corners[:, node].T) for node in range(4)]
-    result = Hinges.constraint(*columns)
-    return np.asarray(np.broadcast_to(result, len(corners)), np.float64)

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from pointmass.errors import InvalidInput, shown
 from pointmass.laws.elements import ConstraintForce
 from pointmass.laws.parameter import Parameter, Scalar
-from pointmass.particles import Particles
 from pointmass.tracing import functions as fn
 
 
@@ -31,6 +29,7 @@ class Springs(ConstraintForce):
     """
 
     nodes = 2
+    unit = "m"
 
     def __init__(
         self,
@@ -54,10 +53,3 @@ class Springs(ConstraintForce):
     def constraint(*x: Any) -> Any:
         """Length [m]."""
         return fn.length(fn.sub(x[0], x[1]))
-
-    def bind(self, particles: Particles) -> None:
-        """Measure rest lengths where none were given, and check the ends."""
-        if "rest" not in self.parameters:
-            ends = particles.x[self.found(particles)].astype(np.float64)
-            self.parameters["rest"] = Parameter("rest", np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), unit="m")
-        super().bind(particles)

@@ -36,6 +36,7 @@ class Volumes(ConstraintForce):
     """
 
     nodes = 4
+    unit = "m^3"
 
     def __init__(
         self, tetrahedra: ArrayLike, k_s: Scalar = 1.0, k_d: Scalar = 0.0, rest: Scalar = 0.0, *, enabled: bool = True

@@ -47,6 +47,11 @@ def coloured(rows: Rows, n: int) -> Rows:
     return colour
 
 
+def colour_starts(colours: Rows) -> Rows:
+    """Where each colour begins among elements in the order of their colours, and the end."""
+    return np.searchsorted(colours, np.arange(colours.max(initial=-1) + 2))
+
+
 def _hash(count: int) -> NDArray[np.uint64]:
     """Scrambled whole numbers (Vigna, splitmix64, 2015)."""
     z = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)

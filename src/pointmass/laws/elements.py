@@ -33,6 +33,7 @@ class ElementForce(Force):
     ----------
     nodes : particles of one element.
     ids : particle ids of the elements, shape (e, nodes).
+    family : what pictures and reports call them: the name of the force, unless it says something else.
     law : (x1, v1, ..., xk, vk, t, *parameters) -> the forces on all nodes, or on all but the last, which takes minus
         their sum.
 
@@ -48,6 +49,7 @@ class ElementForce(Force):
 
     def __init__(self, ids: ArrayLike, parameters: list[Parameter], enabled: bool = True) -> None:
         super().__init__(parameters, enabled=enabled)
+        self.family = self.name
         self.ids = _node_ids(self.name, ids, self.nodes)
         self._rows: tuple[int, Rows] | None = None  # version of the particles, and rows of the ids then
 
@@ -202,8 +204,14 @@ class ConstraintForce(ElementForce):
 
     `f_a = -[k_s (C - rest) + k_d dC/dt] dC/dx_a`, with `dC/dt = sum_a dC/dx_a . v_a` (Witkin, Particle System Dynamics,
     section on energy functions): force, damping, energy and Jacobian follow from C alone. Parameters are
-    named k_s, k_d and rest.
+    named k_s, k_d and rest; without a rest, C at the start is measured.
+
+    Attributes
+    ----------
+    unit : of C.
     """
+
+    unit: ClassVar[str] = ""
 
     _colours: tuple[Rows, Rows] | None = None
 
@@ -211,6 +219,13 @@ class ConstraintForce(ElementForce):
     @abstractmethod
     def constraint(*x: Any) -> Any:
         """C(x1, ..., xk), one number."""
+
+    def bind(self, particles: Particles) -> None:
+        """Measure C where no rest was given, and check the nodes."""
+        if "rest" not in self.parameters:
+            places = particles.x[self.found(particles)].astype(np.float64)
+            self.parameters["rest"] = Parameter("rest", self.at(places), unit=self.unit)
+        super().bind(particles)
 
     def law(self, *arguments: Any) -> Any:
         """The forces on all nodes."""
@@ -252,13 +267,32 @@ class ConstraintForce(ElementForce):
             self._colours = rows, coloured(rows, len(particles))
         return self._colours[1]
 
+    @classmethod
+    def at(cls, places: Array) -> Array:
+        """C of nodes at places, shape (e, nodes, 3) -> (e,)."""
+        return cls._columns(cls.constraint, places, 1)[:, 0]
+
+    @classmethod
+    def slopes(cls, places: Array) -> Array:
+        """dC/dx of nodes at places, shape (e, nodes, 3)."""
+
+        def gradients(*x: Any) -> Any:
+            c = cls.constraint(*x)
+            return [gradient(c, node) for node in x]
+
+        return cls._columns(gradients, places, 3 * cls.nodes).reshape(places.shape)
+
+    @classmethod
+    def _columns(cls, law: Callable[..., Any], places: Array, count: int) -> Array:
+        """So many numbers of each element that follow from the places of its nodes, shape (e, count)."""
+        names = [f"x{a + 1}" for a in range(cls.nodes)]
+        traced = trace(law, dict.fromkeys(names, "vector"), count, cls.__name__)
+        inputs = inputs_for(traced, {n: places[:, a] for a, n in enumerate(names)}, {}, {})
+        return matrix(traced.columns(*inputs), len(places), places.dtype)
+
     def values(self, particles: Particles, x: Array) -> Array:
         """C of each element, shape (e,)."""
-        names = dict.fromkeys(self._names("x"), "vector")
-        traced = trace(self.constraint, names, 1, self.name)
-        rows = self.rows(particles)
-        inputs = inputs_for(traced, {n: x[rows[:, a]] for a, n in enumerate(names)}, {}, {})
-        return matrix(traced.columns(*inputs), len(rows), x.dtype)[:, 0]
+        return self.at(x[self.rows(particles)])
 
 
 def spring_force(law: Callable[..., Any]) -> type[ElementForce]:

@@ -15,9 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from pointmass.laws.colouring import colour_starts
 from pointmass.laws.elements import ConstraintForce
 from pointmass.laws.force import Array, clock, inputs_for, matrix
 from pointmass.particles import Particles
+from pointmass.tracing import functions as fn
 
 
 def relax(
@@ -52,7 +54,7 @@ class _Family:
         rows = force.rows(particles)
         colours = force.colours(particles)
         order = np.argsort(colours, kind="stable")
-        self.starts = np.searchsorted(colours[order], np.arange(colours.max(initial=-1) + 2))
+        self.starts = colour_starts(colours[order])
         self.rows, now = rows[order], clock(t, rows[order, 0])
         law = force.traced_constraint
         count = len(order)
@@ -80,17 +82,13 @@ class _Family:
         for a in range(nodes):
             slope = out[:, 3 + 3 * a : 6 + 3 * a]
             way = slope if project is None else _turned(project[rows[:, a]], slope)
-            softness = softness + w[rows[:, a]] * _dot(slope, way)
-            travelled = travelled + _dot(slope, rise[rows[:, a]])
+            softness = softness + w[rows[:, a]] * fn.dot(tuple(slope.T), tuple(way.T))
+            travelled = travelled + fn.dot(tuple(slope.T), tuple(rise[rows[:, a]].T))
             ways.append(way)
         more = -(k * gap + self.noted[some] + d * travelled) / (1 + (k + d) * softness)
         self.noted[some] = self.noted[some] + more
         for a in range(nodes):
             rise[rows[:, a]] = rise[rows[:, a]] + (w[rows[:, a]] * more)[:, None] * ways[a]
-
-
-def _dot(a: Array, b: Array) -> Array:
-    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
 
 
 def _turned(matrices: Array, a: Array) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.bodies import Body, hair, points
+from pointmass.bodies.hair import YOUNG
 from pointmass.collisions import Capsule, Sphere
 from pointmass.forces import Cushion, Flow, Gravity, Wind
 from pointmass.frame import Camera, Frame
@@ -33,6 +34,7 @@ BALLS = {  # that are drawn: places and radii [m]
     ],
     "eyes": [(side * 0.029, -0.002, 0.079, 0.0095) for side in (-1, 1)],
 }
+RADIUS, DENSITY = 4e-5, 1300.0  # of a hair [m, kg/m^3]
 SOFT = 0.005  # thickness of the layer on the head that hair lies on [m]
 TONES = {
     "brown": ("#3a2213", "#9c6336"),
@@ -138,7 +140,7 @@ class HairScene(ShippedScene):
 
     def _wig(self, strands: int) -> Body:
         """The hair, strong enough for what it has to bear."""
-        bend = self.stiffness * 3e9 * math.pi * 4e-5**4 / 4
+        bend = self.stiffness * YOUNG * math.pi * RADIUS**4 / 4
         return hair(
             strands,
             self.points,
@@ -146,6 +148,8 @@ class HairScene(ShippedScene):
             style=self.style,
             curl_turns=self._turns(),
             jitter=0.08,
+            thickness=2 * RADIUS,
+            density=DENSITY,
             scalp=SCALP,
             cap=80.0,
             crown=(0.0, 1.0, -1.2),
@@ -159,7 +163,7 @@ class HairScene(ShippedScene):
         """Stiffness EA of a strand [N] by what pulls at it: weight, wind, and the turning head."""
         rate, turning, reach = 2 * math.pi / self.period, math.radians(self.turn), SCALP + self.length
         load = self.gravity + 2 * self.wind / self.air + reach * rate**2 * turning * (1 + turning) + 1.0
-        return STRETCH * 1300 * math.pi * 4e-5**2 * self.length * load
+        return STRETCH * DENSITY * math.pi * RADIUS**2 * self.length * load
 
     def _turns(self) -> float | None:
         """Turns per metre: those of the style, or as many as there are points for."""
