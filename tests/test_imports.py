@@ -31,6 +31,7 @@ TEXTS = (
     "engine/support.py",
     "engine/contact_text.py",
     "engine/distances_text.py",
+    "engine/surfaces_text.py",
     "engine/triangles_text.py",
 )  # what kernels import, and kernels' texts
 
@@ -55,7 +56,9 @@ def test_listing_scenes_loads_nothing_heavy() -> None:
     assert not loaded_by("import pointmass.cli, pointmass.scenes") & heavy
 
 
-@pytest.mark.parametrize("registry", ["FORCES", "COLLIDERS", "EMITTERS", "ZONES", "MOTIONS", "SOLVERS", "BODIES"])
+@pytest.mark.parametrize(
+    "registry", ["FORCES", "COLLIDERS", "EMITTERS", "ZONES", "MOTIONS", "CONSTRAINTS", "SOLVERS", "BODIES"]
+)
 def test_everything_in_a_registry_is_public(registry: str) -> None:
     for entry in getattr(pm, registry).values():
         assert getattr(pm, entry.__name__, None) is entry

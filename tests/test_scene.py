@@ -31,12 +31,21 @@ VALIDATOR = jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text()))
 SQUARE = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 1.0], [0.0, 0.0, 1.0]]
 NEEDED: dict[str, dict[str, Any]] = {
     "surface_attractor": {"around": [{"type": "sphere", "radius": 0.4}]},  # what cannot be left out, by kind
+    "avoid": {"around": [{"type": "sphere", "radius": 0.4}]},
     "cushion": {"around": [{"type": "sphere", "radius": 0.4}]},
     "springs": {"pairs": [[0, 1], [1, 2]]},
+    "muscles": {"pairs": [[0, 1], [1, 2]]},
+    "scales": {"links": [[0, 1], [1, 2]]},
+    "slender_drag": {"links": [[0, 1], [1, 2]]},
+    "steer": {"on": "crawler"},
+    "snake": {"segments": 4},
+    "worm": {"segments": 4},
     "angles": {"joints": [[0, 1, 2]]},
     "hinges": {"hinges": [[0, 1, 2, 3]]},
     "volumes": {"tetrahedra": [[0, 1, 2, 3]]},
     "plate_wind": {"triangles": [[0, 1, 2]]},
+    "water": {"triangles": [[0, 1, 2]]},
+    "fins": {"sections": [[0, 1, 2, 3]]},
     "field": {"force": ["-k*x", "0.1*sin(t)", "vx*0"], "constants": {"k": 2.0}},
     "flow": {"velocity": ["-y", "x", "0.1*t"]},
     "mesh": {"mesh": [[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]]},
@@ -45,10 +54,17 @@ NEEDED: dict[str, dict[str, Any]] = {
     "scatter": {"count": 4},
     "polygon": {"vertices": SQUARE},
     "distance_grid": {"distances": [[[-0.5, -0.5], [-0.5, -0.5]], [[0.5, 0.5], [0.5, 0.5]]], "spacing": 1.0},
+    "attachment": {"on": "some", "to": "sheet"},
     "height_field": {"heights": [[0.0, 0.1, 0.2], [0.1, 0.0, -0.1]]},
+    "cloth": {"rows": 6, "cols": 5},  # these only take long by default
+    "hair": {"strands": 8, "points": 6},
+    "jelly": {"counts": [3, 3, 3]},
+    "lattice": {"counts": [3, 3, 3]},
+    "net": {"rows": 4, "cols": 4},
 }
 OTHER: dict[str, Any] = {  # another value than the default, by annotation
     "Contact": "discrete",
+    "Families": ["stretch", "bend"],
     "Response": "slide",
     "bool": False,
     "float | None": 0.3,
@@ -57,6 +73,7 @@ OTHER: dict[str, Any] = {  # another value than the default, by annotation
     "Vector": [0.3, "0.1*cos(t)", -0.2],
     "Velocity": {"type": "vortex", "circulation": 2.0},
     "Selection": "others",
+    "Surfaces | None": "sheet",
     "str": "end",
 }
 ENTRIES = [(what, kind) for what, registry in LISTS.items() for kind in registry]
@@ -88,6 +105,14 @@ def scene_with(what: str, table: dict[str, Any]) -> dict[str, Any]:
         base["forces"] = [{"type": "drag", "k": 0.1}]
     if what == "motions":
         base["bodies"] = [{**body, "pinned": [0]} for body in base["bodies"]]
+    if what == "constraints":
+        base["bodies"].append({"type": "cloth", "name": "sheet", "rows": 3, "cols": 3})
+        base["colliders"] = [{"type": "plane", "point": [0, -5, 0]}]
+    if what == "controllers":
+        base["bodies"].append({"type": "snake", "name": "crawler", "segments": 4})
+        base["bodies"].append({"type": "fish", "name": "fish"})
+    if what == "controllers" or table["type"] == "fish":
+        base["dt"] = 1 / 960  # the ends of its tail are light
     base[what] = [*base.get(what, []), table]
     return base
 
@@ -572,3 +597,12 @@ def test_marks_of_windows_editors_are_no_mistakes(tmp_path: Path) -> None:
     text = '[[bodies]]\ntype = "chain"\nlinks = 2\n'
     (tmp_path / "w.toml").write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
     assert Scene.load(tmp_path / "w.toml") == Scene.from_toml(text)
+
+
+def test_what_a_mesh_looks_up_is_built_once() -> None:
+    ground = pm.HeightField(np.zeros((3, 3)), friction=0.9)
+    scene = pm.Scene(bodies=[pm.chain(2)], colliders=[ground])
+    one, other = (scene.simulation().system.colliders[0] for _ in range(2))
+    assert one.tree is other.tree is ground.tree
+    one.friction = 0.1
+    assert (ground.friction, other.friction) == (0.9, 0.9)

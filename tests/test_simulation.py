@@ -178,6 +178,17 @@ def test_divergence_names_everything_and_keeps_the_state_before():
     np.testing.assert_array_equal(system.get_state(), state)
 
 
+def test_a_divergence_of_many_particles_names_a_step_that_is_surely_stable(monkeypatch):
+    monkeypatch.setattr("pointmass.simulation.MANY_MOTIONS", 10)
+    body = pm.cloth(8, 8, 1.0, pinned="top edge")
+    system = pm.ParticleSystem(body.particles, [pm.Gravity(), *body.forces])
+    longest = system.stability(pm.SymplecticEuler()).largest_safe_dt
+    sim = pm.Simulation(system, pm.SymplecticEuler(), 3 * longest)
+    with pytest.warns(pm.UnstableStep), pytest.raises(pm.Diverged, match=r"bears .* up to a dt of at least") as caught:
+        sim.step(1000)
+    assert 0.4 * longest < caught.value.largest_safe_dt < longest
+
+
 def test_a_solver_that_always_amplifies_says_so():
     p = pm.Particles([[0, 0, 0], [1.1, 0, 0]])
     p.pin([0])

@@ -7,7 +7,7 @@ import pytest
 
 import pointmass as pm
 from pointmass.solvers.function_system import FunctionSystem
-from pointmass.stability import eigenvalues
+from pointmass.stability import eigenvalues, safe_bound
 
 
 def chain(n, k=50.0, m=0.2, k_d=0.0, drag=0.0):
@@ -264,3 +264,38 @@ def test_the_largest_safe_step_is_just_below_the_one_that_diverges(make) -> None
         assert 0 < limit < np.inf, solver.name
         assert growth(system, solver, 0.97 * limit) < 1.0, solver.name
         assert growth(system, solver, 1.25 * limit) > 10.0, solver.name
+
+
+def bound_of(system, solver):
+    return safe_bound(system, solver), system.stability(solver).largest_safe_dt
+
+
+@pytest.mark.parametrize("solver", [pm.SymplecticEuler(), pm.Leapfrog(), pm.RK4()], ids=lambda s: s.name)
+@pytest.mark.parametrize(
+    "system",
+    [
+        chain(6, k_d=0.7, drag=0.3),
+        sheet(5, k_d=0.4),
+        pm.ParticleSystem((jelly := pm.jelly((3, 3, 4), (0.2, 0.2, 0.3), pinned="top")).particles, jelly.forces),
+        pm.ParticleSystem((wig := pm.hair(2, 20, 0.2, style="curly")).particles, wig.forces),
+        pm.ParticleSystem(pm.Particles(np.eye(3), m=0.5), [pm.Drag(k=3.0)]),
+    ],
+    ids=["chain", "sheet", "jelly", "hair", "drag"],
+)
+def test_a_bound_is_below_the_largest_safe_step(system, solver):
+    bound, longest = bound_of(system, solver)
+    assert 0.2 * longest < bound < 1.001 * longest
+
+
+def test_a_bound_that_is_exact():
+    assert bound_of(chain(1), pm.SymplecticEuler()) == pytest.approx((2 / np.sqrt(250),) * 2, rel=1e-6)
+    assert bound_of(chain(1), pm.Euler()) == (0.0, 0.0)
+    assert bound_of(chain(4), pm.ImplicitEuler()) == (np.inf, np.inf)
+    assert bound_of(chain(4), pm.XPBD()) == (np.inf, np.inf)
+
+
+def test_what_a_bound_does_not_know():
+    pairs = pm.ParticleSystem(pm.Particles(np.eye(3)), [pm.Gravitation()])
+    assert safe_bound(pairs, pm.Leapfrog()) is None
+    assert safe_bound(pm.ParticleSystem(pm.Particles(np.eye(3)), [pm.Vortex()]), pm.RK4()) is None
+    assert safe_bound(chain(2, k_d=0.1), pm.Euler()) is None  # amplifies what the damping does not reach, if anything

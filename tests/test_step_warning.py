@@ -113,3 +113,14 @@ def test_a_large_system_takes_a_moment():
     assert said(system, "leapfrog", 0.99 * limit) is None
     assert said(system, "leapfrog", 1.2 * limit) is not None
     assert time.process_time() - began < 2.0
+
+
+def test_a_run_whose_implicit_steps_are_divided_says_so_once() -> None:
+    particles = pm.Particles([[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [0, 40.0, 0], [30.0, 0, 0]])
+    particles.pin([0])
+    system = pm.ParticleSystem(particles, [pm.Springs([(0, 1), (1, 2)], 1e5)])
+    sim = pm.Simulation(system, pm.ImplicitEuler(max_iterations=3), 1 / 60, compiled=False)
+    with pytest.warns(pm.DividedStep, match="implicit_euler were not solved in a step of 0.0167 s") as caught:
+        sim.step(3)
+    assert len(caught) == 1
+    assert sim.engine.stats.rejected > 1

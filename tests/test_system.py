@@ -240,3 +240,40 @@ def test_an_error_in_a_run_says_which_force():
     for question in (system.deriv_eval, system.energy, lambda: system.jacobian(2.0, system.get_state())):
         with pytest.raises(InvalidInput, match=r"force harmonic: at t = 2 s, k_s = -1\.0 is not allowed"):
             question()
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_a_particle_is_divided_into_parts_at_its_place(dtype):
+    """Each with its share of the mass, in the same groups and under the same forces; momentum stays."""
+    particles = Particles(X, V, M, radius=0.1, lifetime=2.0, dtype=dtype, charge=np.arange(6.0))
+    particles.tag("odd", [1, 3, 5])
+    particles.age[:] = 0.5
+    system = ParticleSystem(particles, [Gravity(on="odd"), Drag(k=0.2, on=[3]), Springs([(3, 4)], 1.0)])
+    momentum = system.momentum()
+    ids = system.divide(3, np.array([0.5, 0.3, 0.2]))
+    assert ids.tolist() == [6, 7]
+    np.testing.assert_allclose(particles.m[[3, 6, 7]], M[3] * np.array([0.5, 0.3, 0.2]), rtol=1e-6)
+    np.testing.assert_allclose(system.momentum(), momentum, rtol=1e-6)
+    for column in (particles.x, particles.v, particles.age, particles.lifetime, particles.radius):
+        assert (column[[6, 7]] == column[3]).all()
+    assert particles.attributes["charge"][6:].tolist() == [3, 3]
+    assert particles.groups["odd"].tolist() == [False, True] * 3 + [True, True]
+    assert np.flatnonzero(system.forces[1].on).tolist() == [3, 6, 7]
+    assert system.forces[2].ids.tolist() == [[3, 4]]
+    particles.pin([0])
+    system.divide(0, np.array([0.5, 0.5]))
+    assert particles.pinned.tolist() == [True] + [False] * 7 + [True]
+
+
+def test_elements_are_made_anew_from_old_ones():
+    springs = Springs([(0, 1), (1, 2), (3, 4)], [10.0, 20.0, 30.0], 0.5, [1.0, 2.0, 3.0])
+    system = ParticleSystem(Particles(X), [springs])
+    springs.parameters["k_d"].each(3, "springs")
+    springs.remake(np.array([[0, 5], [3, 4], [2, 4]]), np.array([0, 2, 2]), np.array([1.0, 0.25, 0.75]))
+    settings = springs.settings(system.particles, 0.0, np.arange(3))
+    assert settings["k_s"][0].tolist() == [10.0, 7.5, 22.5]
+    assert settings["k_d"][0].tolist() == [0.5, 0.125, 0.375]
+    assert settings["rest"][0].tolist() == [1.0, 3.0, 3.0]
+    assert system.island_of_particle.tolist() == [0, 1, 2, 2, 2, 0]
+    with pytest.raises(InvalidInput, match="k_s of springs is not allowed to be a function of t"):
+        Springs([(0, 1)], "1 + t").parameters["k_s"].each(1, "springs")

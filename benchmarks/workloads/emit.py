@@ -1,4 +1,4 @@
-"""Births and deaths: a million particles of smoke in curl noise around a ball; a fifth of them is new every second."""
+"""Births and deaths: a million particles of smoke in curl noise around a solid; a fifth of them is new every second."""
 
 import math
 from collections.abc import Callable
@@ -12,6 +12,7 @@ from numpy.polynomial import Polynomial
 
 from benchmarks.track import Array, Contestant, Judge, Race
 from benchmarks.workloads.peers import Ours, start_taichi
+from benchmarks.workloads.solids import Ball, Stone
 
 SAMPLE = 4000  # particles that the judge looks at
 NEARBY = 1000  # and so many of them begin near the collider
@@ -27,43 +28,9 @@ PRIMES, PRIME_OF_COMPONENT = (0x9E3779B1, 0x85EBCA77, 0xC2B2AE3D), 0x165667B1
 FADE = Polynomial([0, 0, 0, 10, -15, 6])
 LEVELS = 1024  # values of each of the three numbers of a gradient
 CELLS = 2**24 - 1  # mask of a lattice index
+BALL, STONE = Ball(), Stone()
 
 Flow = Callable[[Array], tuple[Array, Array]]
-
-
-@dataclass(frozen=True)
-class Ball:
-    """The collider. Another one needs the same three: for pointmass, for NumPy, and for Taichi."""
-
-    center: tuple[float, float, float] = (0.2, 0.1, -0.1)
-    radius: float = 0.8
-
-    def ours(self, **material: Any) -> Any:
-        """As a collider of pointmass."""
-        import pointmass as pm
-
-        return pm.Sphere(self.center, self.radius, **material)
-
-    def distance(self, x: Array) -> tuple[Array, Array]:
-        """Signed distances [m], shape (n,), and unit normals, shape (n, 3)."""
-        d = x - np.array(self.center, x.dtype)
-        size = np.sqrt((d * d).sum(axis=1))
-        return size - x.dtype.type(self.radius), d / size[:, None]
-
-    def taichi(self) -> Any:
-        """A function of a place: the normal and the distance in one vector."""
-        import taichi as ti
-
-        center, radius = ti.Vector(self.center), self.radius
-
-        @ti.func
-        def distance(x):
-            d = x - center
-            size = d.norm()
-            n = d / size
-            return ti.Vector([n[0], n[1], n[2], size - radius])
-
-        return distance
 
 
 @dataclass(frozen=True)
@@ -80,17 +47,14 @@ class Problem:
     eps: float = 1e-5
     side: float = 5.0
     cone: float = 20.0
-    collider: Ball = Ball()
+    collider: Ball | Stone = BALL
     x: Array = field(init=False)
     v: Array = field(init=False)
 
     def __post_init__(self) -> None:
         rng = np.random.default_rng(1)
         x = ((rng.random((self.n, 3)) - 0.5) * self.side).astype(np.float32)
-        gap, normal = self.collider.distance(x)
-        inside = gap < 10 * MARGIN
-        x[inside] += ((0.1 - gap[inside])[:, None] * normal[inside]).astype(np.float32)
-        object.__setattr__(self, "x", x)
+        object.__setattr__(self, "x", self.collider.emptied(x))
         object.__setattr__(self, "v", rng.standard_normal((self.n, 3), dtype=np.float32))
 
     @property
@@ -150,8 +114,13 @@ def races(quick: bool) -> list[Race]:
     case = f"{n:,} particles, {n / LIFETIME:,.0f} births a second"
     substeps = Problem.substeps
     work = float(n * substeps)
-    make = partial(Problem, n)
-    return [Race("Births", case, make, CONTESTANTS, judge, "particle-steps", work, n, slots, 48 / substeps)]
+    return [
+        Race(title, case, make, CONTESTANTS, judge, "particle-steps", work, n, slots, 48 / substeps)
+        for title, make in (
+            ("Births", partial(Problem, n)),
+            ("Births around a mesh", partial(Problem, n, collider=STONE)),
+        )
+    ]
 
 
 # ---------------------------------------------------------------------------------------------------- the reference

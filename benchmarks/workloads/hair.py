@@ -1,15 +1,24 @@
-"""Hair: many equal strands, each a chain of masses with springs to the next mass and to the next but one."""
+"""Hair: many equal strands, each a chain of masses with springs to the next mass and to the next but one.
+
+And the hair of the scene `hair`, with all that it has: strands that resist stretch, bending and torsion, wind in gusts,
+a soft layer on the head, and roots that turn with it. No peer has that, so it is timed alone, at several shapes.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.track import Array, Race
+from benchmarks.track import Array, Judge, Race, against
 from benchmarks.workloads import springs
+from benchmarks.workloads.peers import Ours
 from benchmarks.workloads.springs import Springs
+
+if TYPE_CHECKING:
+    import pointmass as pm
 
 TITLE = "Hair"
 MASSES = 16  # of a strand
@@ -17,19 +26,86 @@ LINK = 0.01  # [m]
 STIFFNESS = 0.1  # k_s dt^2 / m
 DAMPING = 0.01  # k_d dt / m
 SUBSTEPS = 16
+HEAD = "Hair on a head that turns"
+JUDGED = 8  # strands that the judge looks at
+PRODUCTS = {"straight": 181, "wavy": 235, "curly": 235}  # multiplications in the laws, for a particle and its elements
 
 
 def races(quick: bool) -> list[Race]:
-    """Ten thousand strands."""
+    """Ten thousand strands of springs; a hundred thousand masses on a head."""
     strands = 100 if quick else 10_000
     make = partial(hair, strands)
     work = float(SUBSTEPS * strands * (2 * MASSES - 3))
     particles = strands * MASSES
     traffic = 48 * particles / work
     case = f"{strands:,} strands of {MASSES} masses"
-    return [
-        Race(TITLE, case, make, CONTESTANTS, springs.judge, "spring-steps", work, particles, springs.SLOTS, traffic)
-    ]
+    plain = Race(TITLE, case, make, CONTESTANTS, springs.judge, "spring-steps", work, particles, springs.SLOTS, traffic)
+    shapes = [Head(6250, 16), Head(5000, 20), Head(4167, 24, "wavy", 0.26), Head(4167, 24, "curly", 0.2)]
+    return [plain, *(on_a_head(Head(40, 16) if quick else shape) for shape in shapes[: 1 if quick else None])]
+
+
+@dataclass(frozen=True)
+class Head:
+    """The scene `hair` in float32, with its own number of steps."""
+
+    strands: int
+    points: int
+    style: str = "straight"
+    length: float = 0.24
+
+    def scene(self, dtype: str = "float32") -> pm.Scene:
+        """The scene itself."""
+        import pointmass as pm
+
+        kind = pm.SCENES["hair"]
+        made = kind(strands=self.strands, points=self.points, style=self.style, length=self.length).build()
+        made.dtype = dtype
+        return made
+
+    @property
+    def substeps(self) -> int:
+        """Steps of a sixtieth of a second; they depend on a strand, not on how many there are."""
+        return round(1 / 60 / Head(3, self.points, self.style, self.length).scene().dt)
+
+    @property
+    def judged(self) -> np.ndarray[Any, np.dtype[np.intp]]:
+        """Rows of some strands."""
+        which = np.linspace(0, self.strands - 1, min(JUDGED, self.strands)).astype(np.intp)
+        return (which[:, None] * self.points + np.arange(self.points)).ravel()
+
+
+def on_a_head(head: Head) -> Race:
+    """pointmass alone."""
+    particles, steps = head.strands * head.points, head.substeps
+    style = "" if head.style == "straight" else f" {head.style}"
+    case = f"{head.strands:,}{style} strands of {head.points} masses, {steps} steps a frame"
+    unit, work = "particle-steps", float(steps * particles)
+    return Race(
+        HEAD, case, partial(_same, head), [OnAHead], judge_head, unit, work, particles, PRODUCTS[head.style], 48 / steps
+    )
+
+
+def _same(head: Head) -> Head:
+    """What workers can be given."""
+    return head
+
+
+def judge_head(head: Head, scheme: str) -> Judge:
+    """By some strands alone on the reference path in float64; errors in links."""
+    import pointmass as pm
+
+    whole = head.scene("float64").simulation()
+    part = whole.system.part(head.judged)
+    alone = pm.Simulation(part, whole.solver, whole.dt, motions=whole.motions, compiled=False)
+    alone.step(head.substeps)
+    return against(part.particles.x, head.length / (head.points - 1), springs.TOLERANCE, head.judged)
+
+
+class OnAHead(Ours):
+    """The scene as `pointmass run hair` makes it, in float32."""
+
+    def __init__(self, head: Head) -> None:
+        self.sim, self.steps = head.scene().simulation(), head.substeps
 
 
 def hair(strands: int) -> Springs:

@@ -16,7 +16,13 @@ from .bodies import (
     cloth_from_mesh as cloth_from_mesh,
 )
 from .bodies import (
+    fish as fish,
+)
+from .bodies import (
     hair as hair,
+)
+from .bodies import (
+    jelly as jelly,
 )
 from .bodies import (
     lattice as lattice,
@@ -29,6 +35,12 @@ from .bodies import (
 )
 from .bodies import (
     scatter as scatter,
+)
+from .bodies import (
+    snake as snake,
+)
+from .bodies import (
+    worm as worm,
 )
 from .cache import (
     Cache as Cache,
@@ -75,6 +87,42 @@ from .collisions import (
 from .collisions import (
     respond_pair as respond_pair,
 )
+from .constraints import (
+    CONSTRAINTS as CONSTRAINTS,
+)
+from .constraints import (
+    Attachment as Attachment,
+)
+from .constraints import (
+    Constraint as Constraint,
+)
+from .constraints import (
+    SelfContact as SelfContact,
+)
+from .constraints import (
+    StrainLimit as StrainLimit,
+)
+from .constraints import (
+    SurfaceContact as SurfaceContact,
+)
+from .constraints import (
+    Tear as Tear,
+)
+from .controllers import (
+    CONTROLLERS as CONTROLLERS,
+)
+from .controllers import (
+    Controller as Controller,
+)
+from .controllers import (
+    FishBrain as FishBrain,
+)
+from .controllers import (
+    Steer as Steer,
+)
+from .controllers import (
+    Swim as Swim,
+)
 from .emitters import (
     EMITTERS as EMITTERS,
 )
@@ -112,6 +160,9 @@ from .errors import (
     Diverged as Diverged,
 )
 from .errors import (
+    DividedStep as DividedStep,
+)
+from .errors import (
     InvalidInput as InvalidInput,
 )
 from .errors import (
@@ -130,7 +181,13 @@ from .forces import (
     Attractor as Attractor,
 )
 from .forces import (
+    Avoid as Avoid,
+)
+from .forces import (
     Buoyancy as Buoyancy,
+)
+from .forces import (
+    Cruise as Cruise,
 )
 from .forces import (
     CurlNoise as CurlNoise,
@@ -146,6 +203,15 @@ from .forces import (
 )
 from .forces import (
     Field as Field,
+)
+from .forces import (
+    Fins as Fins,
+)
+from .forces import (
+    Flee as Flee,
+)
+from .forces import (
+    Flocking as Flocking,
 )
 from .forces import (
     Flow as Flow,
@@ -181,6 +247,9 @@ from .forces import (
     Magnetic as Magnetic,
 )
 from .forces import (
+    Muscles as Muscles,
+)
+from .forces import (
     PlateWind as PlateWind,
 )
 from .forces import (
@@ -191,6 +260,15 @@ from .forces import (
 )
 from .forces import (
     RingAttractor as RingAttractor,
+)
+from .forces import (
+    Scales as Scales,
+)
+from .forces import (
+    Seek as Seek,
+)
+from .forces import (
+    SlenderDrag as SlenderDrag,
 )
 from .forces import (
     SoftSphere as SoftSphere,
@@ -212,6 +290,9 @@ from .forces import (
 )
 from .forces import (
     VortexRing as VortexRing,
+)
+from .forces import (
+    Water as Water,
 )
 from .forces import (
     Wind as Wind,
@@ -419,6 +500,12 @@ from .tracing.functions import (
 )
 from .tracing.noise import (
     noise as noise,
+)
+from .viewer.film import (
+    to_html as to_html,
+)
+from .viewer.show import (
+    show as show,
 )
 from .zones import (
     ZONES as ZONES,

@@ -18,6 +18,11 @@ PALETTES = {  # sRGB anchors from low to high
     "ice": ("#0b2545", "#13518f", "#2f9fd0", "#8fe0f0", "#f4ffff"),
     "spectrum": ("#5465ff", "#2ec4b6", "#9be15d", "#ffd23f", "#ff5d5d"),
     "aurora": ("#16324f", "#18a999", "#7ae582", "#f6f740", "#ff6f91"),
+    # Even steps of lightness, also for eyes that tell fewer hues (van der Walt and Smith 2015; CC0).
+    "viridis": (
+        *("#440154", "#482878", "#3e4a89", "#31688e", "#26828e"),
+        *("#1f9e89", "#35b779", "#6dcd59", "#b4de2c", "#fde725"),
+    ),
 }
 COOLEST, HOTTEST = 800.0, 40_000.0  # [K]; what is colder glows for no eye (Draper 1847), what is hotter is as blue
 SECOND = 1.438776877e7  # Planck's second radiation constant [nm K]
@@ -43,6 +48,11 @@ def linear(color: Color, brightness: float = 1.0) -> NDArray[np.float32]:
         raise InvalidInput(f"color {color!r} is not known: use a name such as orange, or #rrggbb") from None
     light = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     return np.append(brightness * light, 1.0).astype(np.float32)
+
+
+def srgb(light: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """What files and screens expect for linear light, both from 0 to 1 (IEC 61966-2-1)."""
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
 
 
 def palette(name: str, level: Array, brightness: float = 1.0) -> NDArray[np.float32]:

@@ -145,6 +145,23 @@ def element_blocks(system: ParticleSystem) -> list[ElementBlocks]:
     return result
 
 
+def element_sums(system: ParticleSystem) -> Array:
+    """Sums over the elements at each particle of |M^-1/2 B M^-1/2|, B being df/dx and df/dv, shape (2, n)."""
+    p = system.particles
+    x, v = bent(system).astype(np.float64), p.v.astype(np.float64)
+    weight = np.sqrt(np.where(p.pinned, 0.0, p.w.astype(np.float64)))
+    sums = np.zeros((2, len(p)))
+    for force in element_forces(system):
+        rows = force.rows(p)
+        for k, matrices in enumerate(force.element_jacobians(p, system.t, x, v)):
+            squares = np.zeros(len(rows))
+            for a, b in np.ndindex(force.nodes, force.nodes):
+                block = (matrices[:, a, i, b, j] for i, j in np.ndindex(3, 3))  # columns that lie together in memory
+                squares += (weight[rows[:, a]] * weight[rows[:, b]]) ** 2 * sum(column * column for column in block)
+            sums[k] += np.bincount(rows.ravel(), np.repeat(np.sqrt(squares), force.nodes), len(p))
+    return sums
+
+
 def bent(system: ParticleSystem) -> Array:
     """Positions now, those in elements of three and more particles shifted by next to nothing, shape (n, 3).
 

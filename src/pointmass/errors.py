@@ -34,7 +34,8 @@ class Diverged(PointmassError, ArithmeticError):
     time : float or None
         Time at which that step began [s].
     largest_safe_dt : float or None
-        Largest step that the stiffnesses and the solver's stability limit allow [s].
+        Largest step that the stiffnesses and the solver's stability limit allow [s]; of more than 2000 particles a
+        bound from below, that is a step that they allow.
     """
 
     def __init__(
@@ -57,6 +58,10 @@ class Diverged(PointmassError, ArithmeticError):
 
 class UnstableStep(UserWarning):
     """A step is longer than the largest with which the motions at the start of a run stay in bounds; it runs anyway."""
+
+
+class DividedStep(UserWarning):
+    """The equations of an implicit step were not solved as they are, so it was made in parts."""
 
 
 def unknown(what: str, name: object, known: Iterable[str]) -> InvalidInput:

@@ -10,22 +10,23 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass import over_life, random
+from pointmass import animals, over_life, random
 from pointmass.bodies.hair import STRAND
 from pointmass.collisions.collider import Collider
 from pointmass.collisions.plane import Plane
 from pointmass.colors import PALETTES, Color, blackbody, linear, palette
 from pointmass.errors import InvalidInput, about, finite_array, number, shown, unknown, whole_number
+from pointmass.flow_field import field_arrows, field_of, streamlines
+from pointmass.forces.muscles import Muscles
 from pointmass.forces.springs import Springs
-from pointmass.frame import PATTERNS, Arrows, Curves, Drawable, Points, Segments, Triangles
-from pointmass.laws.unary import VelocityField
+from pointmass.frame import PATTERNS, Curves, Drawable, Points, Segments, Triangles
 from pointmass.over_life import Curve, Gradient
 from pointmass.particles import Array, Particles
-from pointmass.solvers import FunctionSystem, Midpoint
+from pointmass.skin import Skin
 from pointmass.strands import Strands
 from pointmass.system import ParticleSystem
 
-KINDS = ("solid", "glow", "smoke", "flakes", "none")  # of particles
+KINDS = ("solid", "glow", "smoke", "flakes", *animals.SHAPES, "none")  # of particles
 OF_GROUP = "particles of "
 OWN_COLOR = ("red", "green", "blue")  # attributes: linear light
 OF_PARTICLES = (  # what a group may have otherwise
@@ -45,7 +46,9 @@ OF_PARTICLES = (  # what a group may have otherwise
     *("size_over_life", "brightness_over_life", "opacity_over_life", "color_over_life"),
 )
 SMALLEST_FLAKE, LARGEST_FLAKE = 0.5, 1.5  # times the size
-CURVE_STEPS = 60
+EYES = "#0b0d10"
+SHORT, LONG = "#ff3b30", "#3a6df0"  # colours of a muscle that is by FAR shorter or longer than at rest
+FAR = 0.15
 FAMILY_COLORS = {"stretch": "#5fa8ff", "shear": "#5fe3a1", "bend": "#ff6b6b", "volume": "#ff6b6b"}  # as on the slide
 
 
@@ -56,14 +59,15 @@ class Look:
     Attributes
     ----------
     particles : "solid": shaded balls; "glow": points of light; "smoke": soft puffs that shade each other; "flakes":
-        matt flakes of many sizes and directions; "none".
-    size : radius at which particles are drawn [m]; None = their own radius, or 1% of the scene if they have none.
+        matt flakes of many sizes and directions; "birds", "fish": they look where they go; "none".
+    size : radius at which particles are drawn, of animals half their length [m]; None = their own radius, or 1% of the
+        scene if they have none.
     color : of particles, a name, "#rrggbb", or the temperature [K] at which a body glows in this colour. Particles with
         attributes red, green and blue (linear light) have their own.
     color_by : "speed", "age", "id" or a particle attribute: colours from the palette instead; "temperature": that of
         each particle's attribute temperature [K].
     color_range : values at both ends of the palette; None = those of the frame.
-    palette : fire, ice, spectrum or aurora.
+    palette : fire, ice, spectrum, aurora or viridis.
     brightness : factor on the light of particles.
     opacity : of particles, from 0 to 1; of a puff of smoke in its middle.
     daylight : factor on the light of the picture's lamps on smoke and flakes; 0: only what glows lights them.
@@ -76,22 +80,22 @@ class Look:
         of what is said here of particles. Who is in several has the first.
     shutter : exposure time [s], 0 = a moment: a glowing particle is a streak as long as the way that it went meanwhile,
         and as much dimmer; a ball or a flake is smeared along its way. Films have half the time between two frames.
-    surfaces : whether the surfaces of bodies are drawn, such as cloth, in place of their particles, but for those of
-        `groups`. A group with the name of a body is the look of its surface.
+    surfaces : whether the surfaces and skins of bodies are drawn, such as cloth, in place of their particles, but for
+        those of `groups`. A group with the name of a body is the look of its surface.
     pattern : of surfaces: "plain", "checker", or "stripes" side by side, and "bands" one above the other, in turns of
         the particles' colour and `pattern_color`.
     pattern_color : see there.
     pattern_count : fields of the pattern along each side.
     springs : whether springs are drawn, as lines of `spring_width` [m] (None = 0.3% of the scene) and `spring_color`
-        (None = by family); None = those that are not in a surface that is drawn. Those of hair are drawn as strands,
-        `spring_width` thick at the root.
+        (None = by family, and muscles red where they are short and blue where they are long); None = those that are not
+        in a surface that is drawn. Those of hair are drawn as strands, `spring_width` thick at the root.
     strand_color, tip_color : of hair at its roots and at its tips.
     children : strands drawn between each strand of hair and its neighbours, which are not simulated.
     children_seed : another one gives other children.
     clump : how far children draw near to their strand from root to tip, 0 to 1: curls then keep their shape.
     trails : length of the particles' trails [s], 0 = none.
-    arrows : arrows of a flow along the longest side, 0 = none.
-    streamlines : integral curves of a flow, 0 = none.
+    arrows : arrows of a flow, or of the air, along the longest side, 0 = none.
+    streamlines : integral curves of a flow, or of the air, 0 = none.
     field_box : corners of the box in which arrows and integral curves are drawn [m]; None = that of the particles at
         the start.
     colliders : whether surfaces are drawn, in `collider_color`.
@@ -99,7 +103,7 @@ class Look:
         far as one can see.
     """
 
-    particles: Literal["solid", "glow", "smoke", "flakes", "none"] = "solid"
+    particles: Literal["solid", "glow", "smoke", "flakes", "birds", "fish", "none"] = "solid"
     size: float | None = None
     color: Color = "#ffb454"
     color_by: str | None = None
@@ -188,10 +192,14 @@ class Look:
         result: list[Drawable] = []
         if self.colliders:
             result += [self._collider(c, k, t, extent, frame) for k, c in enumerate(system.colliders)]
-        if system.order == 1 and (self.arrows or self.streamlines):
+        if self.arrows or self.streamlines:
             result += self._field(system, t, stage, frame)
         if self.surfaces:
-            result += [self._surface(name, system.particles, v, age, frame) for name in system.particles.surfaces]
+            for name, surface in system.particles.surfaces.items():
+                if surface.skin is not None:
+                    result += self._skin(name, surface.skin, system.particles, x, frame)
+                else:
+                    result.append(self._surface(name, system.particles, v, age, frame))
         if self.springs is not False:
             result += self._springs(system, x, stage, covered, frame)
         if self.trails > 0:
@@ -201,7 +209,9 @@ class Look:
         for name, look, rows in parts:
             hidden = look is self or name.removeprefix(OF_GROUP) in system.particles.surfaces
             seen = rows[~covered[rows]] if hidden else rows
-            if look.particles != "none" and len(seen):
+            if look.particles in animals.SHAPES and len(seen):
+                result.append(look._animals(name, system.particles, t, x, v, age, seen, extent, frame))
+            elif look.particles != "none" and len(seen):
                 result.append(look._particles(name, system.particles, v, age, seen, extent, frame))
         return tuple(result)
 
@@ -218,10 +228,11 @@ class Look:
         return [*parts, ("particles", self, np.flatnonzero(rest))]
 
     def _covered(self, p: Particles) -> NDArray[np.bool_]:
-        """Who is not drawn, but the surface at whose corner it is."""
+        """Who is not drawn, but the surface at whose corner it is, or inside of which."""
         result = np.zeros(len(p), bool)
         for name in p.surfaces if self.surfaces else ():
             result[p.corners(name)] = True
+            result[p.rows(p.surfaces[name].inside)] = True
         return result
 
     def _surface(self, name: str, p: Particles, v: Array, age: Array, frame: int) -> Triangles:
@@ -229,17 +240,49 @@ class Look:
         faces = p.corners(name).astype(np.int32)
         colors = look._colors(p, v, age, np.arange(int(faces.max(initial=-1)) + 1))
         alike = not len(colors) or bool((colors == colors[0]).all())
+        uv = p.surfaces[name].uv
         color: Any = (1.0, 1.0, 1.0, 1.0) if not len(colors) else tuple(colors[0].tolist()) if alike else colors
         return Triangles(
             name=name,
             version=p.version if alike else frame,
             faces=faces,
             color=color,
-            uv=None if look.pattern == "plain" else p.surfaces[name].uv.astype(np.float32),
-            pattern=look.pattern,
-            pattern_count=look.pattern_count,
-            pattern_color=tuple((look.brightness * linear(look.pattern_color)[:3]).tolist()),
+            uv=uv.astype(np.float32) if uv.any() else None,
+            **look._patterned(),
         )
+
+    def _patterned(self) -> dict[str, Any]:
+        """The pattern of a surface."""
+        light = self.brightness * linear(self.pattern_color)[:3]
+        return {
+            "pattern": self.pattern,
+            "pattern_count": self.pattern_count,
+            "pattern_color": tuple(light.tolist()),
+        }
+
+    def _skin(self, name: str, skin: Skin, p: Particles, x: Array, frame: int) -> list[Drawable]:
+        """A smooth skin over the particles at places x, and its eyes."""
+        look = (self.groups or {}).get(name, self)
+        x = x[p.rows(skin.nodes)]
+        color = look.brightness * linear(look.color)
+        color[3] = look.opacity
+        worn: list[Drawable] = [
+            Triangles(
+                name=name,
+                version=frame,
+                vertices=skin.corners(x),
+                faces=skin.all_faces(),
+                color=color,
+                uv=np.tile(skin.uv, (len(skin.nodes), 1, 1)).astype(np.float32),
+                **look._patterned(),
+            )
+        ]
+        if len(skin.eyes):
+            pupils, color = skin.pupils(x), linear(EYES)
+            worn.append(
+                Points(name=f"{name} eyes", version=frame, vertices=pupils, radius=skin.eye_radius, color=color)
+            )
+        return worn
 
     def _particles(
         self, name: str, p: Particles, v: Array, age: Array, rows: NDArray[np.intp], extent: float, frame: int
@@ -268,6 +311,23 @@ class Look:
             normals=normals,
             daylight=self.daylight,
         )
+
+    def _animals(
+        self,
+        name: str,
+        p: Particles,
+        t: float,
+        x: Array,
+        v: Array,
+        age: Array,
+        rows: NDArray[np.intp],
+        extent: float,
+        frame: int,
+    ) -> Triangles:
+        size = self.size or 0.01 * extent
+        corners, faces = animals.mesh(self.particles, x[rows], v[rows], p.id[rows], t, size)
+        colors = np.repeat(self._colors(p, v, age, rows), len(corners) // len(rows), axis=0)
+        return Triangles(name=name, version=frame, vertices=corners, faces=faces, color=colors, smooth=False)
 
     def _colors(self, p: Particles, v: Array, age: Array, rows: NDArray[np.intp]) -> NDArray[np.float32]:
         """Linear RGBA of each particle."""
@@ -330,23 +390,32 @@ class Look:
                 ends = linear(self.strand_color), linear(self.tip_color)
                 result.append(stage.strands[force].drawn(name, p, x, width, *ends, frame))
                 continue
-            color = linear(self.spring_color or FAMILY_COLORS.get(force.family, "#9fb4cc"))
-            pairs = force.rows(p).astype(np.int32)
+            color: Any = linear(self.spring_color or FAMILY_COLORS.get(force.family, "#9fb4cc"))
+            pairs, version = force.rows(p).astype(np.int32), p.version
+            if isinstance(force, Muscles) and self.spring_color is None:
+                color, version = _contraction(force, p, x), frame
             if self.springs is None:
-                pairs = pairs[~covered[pairs].all(axis=1)]
+                seen = ~covered[pairs].all(axis=1)
+                pairs, color = pairs[seen], color[seen] if color.ndim == 2 else color
             if len(pairs):
-                result.append(Segments(name=name, version=p.version, pairs=pairs, width=width, color=color))
+                result.append(Segments(name=name, version=version, pairs=pairs, width=width, color=color))
         return result
 
     def _field(self, system: ParticleSystem, t: float, stage: Stage, frame: int) -> list[Drawable]:
+        field = field_of(system)
+        if field is None:
+            return []
         low, high = stage.low, stage.high
-        steady = all(isinstance(f, VelocityField) and f.steady for f in system.forces)
-        version = 0 if steady else frame
+        key = (field.key, self.arrows, self.streamlines) if field.steady else None
+        if key is not None and key == stage.field[0]:
+            return stage.field[1]
+        version = 0 if key is not None and not stage.field[1] else frame
         result: list[Drawable] = []
         if self.arrows:
-            result.append(_field_arrows(system, t, low, high, self.arrows, version))
+            result.append(field_arrows(field, t, low, high, self.arrows, version))
         if self.streamlines:
-            result.append(_streamlines(system, t, low, high, self.streamlines, version))
+            result.append(streamlines(field, t, low, high, self.streamlines, version))
+        stage.field = key, result
         return result
 
 
@@ -369,6 +438,15 @@ def _of_group(name: str, look: Any) -> Look:
     return look
 
 
+def _contraction(force: Muscles, p: Particles, x: Array) -> NDArray[np.float32]:
+    """Linear RGBA of each muscle: pale at rest, red where it is short, and blue where it is long."""
+    idle = force.settings(p, 0.0, np.arange(len(force.ids)))["rest"][0]
+    longer = np.clip((force.values(p, x) / idle - 1) / FAR, -1, 1)[:, None]
+    pale, short, long = (linear(c) for c in ("#f2eee6", SHORT, LONG))
+    way = np.where(longer < 0, short, long)
+    return np.asarray(pale + np.abs(longer) * (way - pale), np.float32)
+
+
 def _life(p: Particles, age: Array, rows: NDArray[np.intp]) -> Array:
     """Which fraction of its lifetime each has behind it."""
     life: Array = np.minimum(age[rows] / p.lifetime[rows], 1)
@@ -383,6 +461,7 @@ class Stage:
     low, high : corners of the box in which fields are drawn [m].
     extent : size of the scene [m]; lines and small particles are drawn in proportion to it.
     trails : where the particles were.
+    field : what is drawn of the field, and of which one if it is steady.
     strands : of hair, by the springs along them.
     """
 
@@ -393,6 +472,7 @@ class Stage:
         self.low, self.high = _bounds(x) if look.field_box is None else np.array(look.field_box, np.float64)
         self.extent = _extent(x)
         self.trails = Trails(look)
+        self.field: tuple[Any, list[Drawable]] = (None, [])
         self.strands = {
             force: Strands(force, system.particles, look.children, look.clump, look.children_seed)
             for force in system.forces
@@ -463,74 +543,3 @@ def _extent(x: Array) -> float:
         return 1.0
     low, high = np.percentile(x, [2, 98], axis=0)
     return max(float((high - low).max()), 1e-3)
-
-
-class _Probe:
-    """The flow of a system at points of our own choice."""
-
-    def __init__(self, system: ParticleSystem, points: Array) -> None:
-        self.fields = [f for f in system.forces if f.enabled and f.on is None]
-        self.particles = Particles(points)
-
-    def velocity(self, t: float, points: Array) -> Array:
-        """Velocities [m/s], shape (k, 3); 0 where the field is not finite."""
-        total = np.zeros_like(points)
-        for field in self.fields:
-            field.add_forces(self.particles, t, points, self.particles.v, total)
-        return np.where(np.isfinite(total), total, 0)
-
-
-def _grid(low: Array, high: Array, count: int) -> Array:
-    step = float((high - low).max()) / count
-    axes = [np.arange(a + step / 2, b, step) if b > a else np.array([a]) for a, b in zip(low, high, strict=True)]
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-
-
-def _field_arrows(system: ParticleSystem, t: float, low: Array, high: Array, count: int, version: int) -> Arrows:
-    tails = _grid(low, high, count)
-    flow = _Probe(system, tails).velocity(t, tails)
-    speed = np.sqrt((flow * flow).sum(axis=1))
-    step = float((high - low).max()) / count
-    top = float(np.percentile(speed, 95)) if len(speed) else 0.0
-    size = 0.8 * step * np.minimum(speed / top, 1) if top > 0 else np.zeros(len(speed))
-    vectors = flow * (size / np.where(speed > 0, speed, 1))[:, None]
-    color = palette("ice", 0.25 + 0.5 * np.minimum(speed / (top or 1), 1))
-    return Arrows(
-        name="field",
-        version=version,
-        vertices=(tails - 0.5 * vectors).astype(np.float32),
-        vectors=vectors.astype(np.float32),
-        width=0.07 * step,
-        color=color,
-    )
-
-
-def _streamlines(system: ParticleSystem, t: float, low: Array, high: Array, count: int, version: int) -> Curves:
-    """Integral curves of the field frozen at t: midpoint steps of equal length from evenly spread seeds."""
-    side = float(np.prod((high - low)[high > low]) / count) ** (1 / max(1, int((high > low).sum())))
-    x = _grid(low, high, max(1, round(float((high - low).max()) / side)))
-    step = 0.6 * float((high - low).max()) / CURVE_STEPS
-    probe = _Probe(system, x)
-
-    def unit_flow(_t: Any, y: Array) -> Array:
-        flow = probe.velocity(t, y.reshape(-1, 3))
-        size = np.sqrt((flow * flow).sum(axis=1))[:, None]
-        return np.asarray(np.where(size > 1e-12, flow / np.where(size > 1e-12, size, 1), 0)).ravel()
-
-    curve, solver = FunctionSystem(unit_flow, x.size), Midpoint()
-    path = [x.ravel()]
-    for _ in range(CURVE_STEPS):
-        path.append(solver.step(curve, 0.0, path[-1], step, {}).y1)
-    points = np.stack(path).reshape(len(path), -1, 3).transpose(1, 0, 2)
-    inside = np.all((points >= low - 1e-9) & (points <= high + 1e-9), axis=2)
-    length = np.where(inside.all(axis=1), points.shape[1], np.argmin(inside, axis=1))
-    keep = np.arange(points.shape[1])[None, :] < length[:, None]
-    return Curves(
-        name="streamlines",
-        version=version,
-        vertices=points[keep].astype(np.float32),
-        index=np.arange(int(keep.sum()), dtype=np.int32),
-        offsets=np.concatenate([[0], np.cumsum(length)]).astype(np.int32),
-        width=0.15 * step,
-        color=linear("#3d6d8f"),
-    )

@@ -18,6 +18,7 @@ Faces = NDArray[np.int64]
 FORMATS = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off")
 SAME = 1e-9  # of a mesh's size: vertices nearer to each other are one
 FLAT = 1e-12  # of the square of its longest edge: a triangle of less area is none
+FILLED = 1 - 1e-9  # of the volume of its convex hull: a mesh that fills as much is convex
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +96,13 @@ class TriangleMesh:
         return float((a * np.cross(b, c)).sum() / 6)
 
     @cached_property
+    def convex(self) -> bool:
+        """Whether it bounds one convex solid: it fills its convex hull."""
+        from scipy.spatial import ConvexHull
+
+        return self.closed and abs(self.volume) > FILLED * float(ConvexHull(self.vertices).volume)
+
+    @cached_property
     def _runs(self) -> NDArray[np.int64]:
         """For each edge the triangles that run along it upwards in the order of the vertices, less those downwards."""
         pairs, which = self.edges
@@ -102,7 +110,7 @@ class TriangleMesh:
         return np.bincount(which.ravel(), way.ravel(), len(pairs)).astype(np.int64)
 
 
-TriangleSource = str | Path | tuple[Any, Any] | TriangleMesh  # what `as_mesh` takes
+TriangleSource = str | Path | tuple[Any, Any] | tuple[Any, Any, Any] | TriangleMesh  # what `as_mesh` takes
 
 
 def read_mesh(path: str | Path) -> TriangleMesh:
@@ -132,7 +140,7 @@ def triangle_mesh(vertices: Any, faces: Any, uv: Any = None) -> TriangleMesh:
     ----------
     vertices : [m], shape (n, 3).
     faces : three of the vertices' numbers for each triangle, shape (k, 3).
-    uv : place of each vertex on a flat pattern, shape (n, 2).
+    uv : place on a flat pattern of each vertex, shape (n, 2), or of the corners of faces, shape (k, 3, 2) or (k, 6).
 
     Raises
     ------
@@ -141,7 +149,7 @@ def triangle_mesh(vertices: Any, faces: Any, uv: Any = None) -> TriangleMesh:
     """
     points = finite_array("vertices of a mesh", vertices, (None, 3))
     corners = _numbers(faces, len(points))
-    pattern = None if uv is None else finite_array("uv of a mesh", uv, (len(points), 2))[corners]
+    pattern = None if uv is None else _pattern(uv, len(points), corners)
     points, corners = _merged(points, corners)
     solid = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
     solid &= ~_flat(points[corners])
@@ -153,14 +161,16 @@ def triangle_mesh(vertices: Any, faces: Any, uv: Any = None) -> TriangleMesh:
 
 
 def as_mesh(mesh: Any) -> TriangleMesh:
-    """A mesh as it is, read from its path, or made of a pair (vertices, faces)."""
+    """A mesh as it is, read from its path, or made of (vertices, faces) or (vertices, faces, uv)."""
     if isinstance(mesh, TriangleMesh):
         return mesh
     if isinstance(mesh, (str, Path)):
         return read_mesh(mesh)
-    if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
+    if isinstance(mesh, (tuple, list)) and len(mesh) in (2, 3):
         return triangle_mesh(*mesh)
-    raise InvalidInput(f"a mesh must be the path of a file or a pair (vertices, faces), not {shown(mesh)}")
+    raise InvalidInput(
+        f"a mesh must be the path of a file or a pair (vertices, faces), or (vertices, faces, uv), not {shown(mesh)}"
+    )
 
 
 def _contents(file: Path) -> tuple[Any, Any, Any]:
@@ -190,6 +200,14 @@ def _numbers(faces: Any, count: int) -> Faces:
             f"face {k} of a mesh has the vertices {array[k].astype(int).tolist()}: they are numbered 0 to {count - 1}"
         )
     return array.astype(np.int64)
+
+
+def _pattern(uv: Any, count: int, faces: Faces) -> NDArray[np.float64]:
+    """Places of the corners of faces, shape (k, 3, 2), from those of vertices or of corners."""
+    given = floats(uv)
+    if given is not None and given.shape[0:1] == (len(faces),) and given.size == 6 * len(faces) and given.ndim > 1:
+        return finite_array("uv of a mesh", given.reshape(-1, 3, 2), (len(faces), 3, 2))
+    return finite_array("uv of a mesh", uv, (count, 2))[faces]
 
 
 def _merged(points: Vertices, faces: Faces) -> tuple[Vertices, Faces]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,9 +12,9 @@ from numpy.typing import NDArray
 
 from pointmass.collisions.collider import unit
 from pointmass.description import Described
-from pointmass.errors import InvalidInput, finite_array
+from pointmass.errors import InvalidInput, finite_array, shown
 from pointmass.laws.parameter import Parameter, Scalar, Vector
-from pointmass.particles import Array, Particles, Selection
+from pointmass.particles import Array, Particles, Selection, read_only
 from pointmass.solvers.base import Solver
 from pointmass.tracing import functions as fn
 
@@ -59,8 +61,11 @@ class RigidMotion(Described):
                 raise InvalidInput(f"{parameter.name} may depend on t and nothing else")
         self._rates = self._shift.rate(), self._angle.rate()
         self.ids: NDArray[np.int64] = np.zeros(0, np.int64)
-        self._start: tuple[float, Array] = 0.0, np.zeros((0, 3))
-        self._rows: tuple[int, NDArray[np.intp], NDArray[np.bool_]] | None = None
+        self.arms: Array = np.zeros((0, 3))
+        self._start = 0.0
+        x, y, z = self.axis
+        self._across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])  # times a vector: axis x vector
+        self._twice = self._across @ self._across
 
     def bind(self, particles: Particles, t: float) -> None:
         """Note who is led, and from where.
@@ -75,30 +80,137 @@ class RigidMotion(Described):
         if not len(rows):
             who = "of the particles" if self.on is None else f"of {self.on!r}"
             raise InvalidInput(f"a motion leads pinned particles, and none {who} is pinned: pin those that it leads")
-        self.ids, self._start = particles.id[rows], (t, particles.x[rows].astype(np.float64))
+        self.ids, self._start = particles.id[rows], t
+        self.arms = particles.x[rows].astype(np.float64) - self.center
 
-    def rows(self, particles: Particles) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-        """Rows of those of `ids` who are still there, and who that is."""
-        if self._rows is None or self._rows[0] != particles.version:
-            rows = particles.rows(self.ids)
-            self._rows = particles.version, rows[rows >= 0], rows >= 0
-        return self._rows[1:]
+    def maps(self, times: Array) -> Array:
+        """What takes `arms` to places and velocities at some times, shape (times, 2, 3, 4).
 
-    def at(self, t: float) -> tuple[Array, Array]:
-        """Places [m] and velocities [m/s] at time t, shape (k, 3), of the particles `ids`."""
-        t0, start = self._start
-        (angle,), (angle0,), (spin,) = self._angle.at(t), self._angle.at(t0), self._rates[1].at(t)
-        shift = np.array(self._shift.at(t), np.float64) - np.array(self._shift.at(t0), np.float64)
-        c, s = float(fn.cos(angle - angle0)), float(fn.sin(angle - angle0))
-        arm = start - self.center
-        along = (arm[:, :1] * self.axis[0] + arm[:, 1:2] * self.axis[1] + arm[:, 2:] * self.axis[2]) * self.axis
-        flat = arm - along  # turned in the plane across the axis, where (flat, side) are at right angles
-        side = np.cross(self.axis, flat)
-        velocity = np.array(self._rates[0].at(t), np.float64) + float(spin) * (c * side - s * flat)
-        return self.center + along + c * flat + s * side + shift, velocity
+        A place is M arm + b [m], with M and b the first three columns and the last one of the first 3x4 matrix; a
+        velocity [m/s] likewise, by the second one. R = 1 + sin(a) K + (1 - cos(a)) K^2, where K r = axis x r
+        (Rodrigues).
+
+        Raises
+        ------
+        InvalidInput
+            A formula is not finite at one of the times.
+        """
+        (angle,), (angle0,), (spin,) = self._angle.at(times), self._angle.at(self._start), self._rates[1].at(times)
+        c, s = (np.broadcast_to(f(angle - angle0), times.shape)[:, None, None] for f in (fn.cos, fn.sin))
+        result = np.zeros((len(times), 2, 3, 4))
+        result[:, 0, :, :3] = np.eye(3) + s * self._across + (1.0 - c) * self._twice
+        result[:, 1, :, :3] = np.broadcast_to(spin, times.shape)[:, None, None] * (c * self._across + s * self._twice)
+        moves = zip(self._shift.at(times), self._shift.at(self._start), self._rates[0].at(times), strict=True)
+        for axis, (shift, shift0, speed) in enumerate(moves):
+            result[:, 0, axis, 3] = self.center[axis] + (shift - shift0)
+            result[:, 1, axis, 3] = speed
+        return result
 
 
 MOTIONS: Mapping[str, type[RigidMotion]] = {"rigid": RigidMotion}
+
+
+@dataclass(frozen=True, eq=False)
+class Led:
+    """Those of some particles who are led.
+
+    Attributes
+    ----------
+    rows : of them, in the order of their motions.
+    motion : number of the motion of each.
+    arms : places seen from the center of that motion at the start [m], shape (k, 3).
+    columns : the same for all particles: number of the motion, from 1 on, or 0, and arms, shape (4, n).
+    """
+
+    rows: NDArray[np.intp]
+    motion: NDArray[np.intp]
+    arms: Array
+    columns: list[Array]
+
+
+NOBODY = Led(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros((0, 3)), [])
+
+
+@dataclass(eq=False)
+class Motions:
+    """The motions of a run, and what a solver sees of them."""
+
+    motions: Sequence[RigidMotion] = ()
+    stage: float = 0.0  # where in a step, from 0 to 1, the solver sees pins that move
+    _led: tuple[Any, Led | None] = field(default=(None, None), init=False)
+    _next: tuple[float, Array] = field(default=(math.nan, np.zeros(0)), init=False)  # maps of the end of steps
+
+    @classmethod
+    def of(cls, motions: Sequence[RigidMotion], solver: Solver, particles: Particles, t: float) -> Motions:
+        """Motions that begin at time t.
+
+        Raises
+        ------
+        InvalidInput
+            One leads nobody, two lead the same particle.
+        """
+        for motion in motions:
+            if not isinstance(motion, RigidMotion):
+                raise InvalidInput(f"motions must be motions, such as pm.RigidMotion(), not {shown(motion)}")
+            motion.bind(particles, t)
+        led, times = np.unique(np.concatenate([[-1], *(m.ids for m in motions)]), return_counts=True)
+        if (times > 1).any():
+            raise InvalidInput(f"two motions lead particle {int(led[times > 1][0])}: give each motion its own")
+        return cls(motions, stage_of(solver))
+
+    def __bool__(self) -> bool:
+        return len(self.motions) > 0
+
+    def led(self, particles: Particles) -> Led:
+        """Who of those that are there is led."""
+        if not self.motions:
+            return NOBODY  # at once: particles come and go in each step of a run
+        ids, found = self._led
+        if found is None or ids is not particles.id:
+            rows = [particles.rows(motion.ids) for motion in self.motions]
+            row = np.concatenate([np.zeros(0, np.intp), *(r[r >= 0] for r in rows)])
+            number = np.repeat(np.arange(len(rows)), [int((r >= 0).sum()) for r in rows])
+            arms = [m.arms[r >= 0] for m, r in zip(self.motions, rows, strict=True)]
+            arm = np.concatenate([np.zeros((0, 3)), *arms])
+            columns = np.zeros((4, len(particles)))
+            columns[:, row] = np.stack([number + 1, *arm.T])
+            found = Led(row, number, arm, [read_only(column) for column in columns])
+            self._led = particles.id, found
+        return found
+
+    def seen(self, starts: Array, ends: Array) -> Array:
+        """Maps of all motions where a solver sees them in steps, shape (steps, motions, 2, 3, 4).
+
+        Raises
+        ------
+        InvalidInput
+            A formula is not finite in one of the steps.
+        """
+        times = np.append(starts + self.stage * (ends - starts), ends[-1:])
+        found = np.stack([motion.maps(times) for motion in self.motions], axis=1)
+        self._next = (float(ends[-1]), found[-1]) if len(ends) else (math.nan, found)
+        return found[: len(starts)]
+
+    def put(self, particles: Particles, x: Array, v: Array, t: float) -> NDArray[np.intp]:
+        """Put who is led where they are at time t; returns their rows."""
+        led, begin = self.led(particles), 0
+        known = self._next[1] if self._next[0] == t else None
+        for k, motion in enumerate(self.motions):
+            end = int(np.searchsorted(led.motion, k, side="right"))
+            rows, (a, b, c) = led.rows[begin:end], led.arms[begin:end].T
+            maps = motion.maps(np.array([t]))[0] if known is None else known[k]
+            for column, m in zip((x, v), maps, strict=True):
+                for axis in range(3):  # added up as in kernels
+                    column[rows, axis] = a * m[axis, 0] + b * m[axis, 1] + c * m[axis, 2] + m[axis, 3]
+            begin = end
+        return led.rows
+
+    def put_in_step(self, particles: Particles, start: float, end: float) -> NDArray[np.intp]:
+        """Put who is led where the solver wants to see them in a step; returns their rows."""
+        return self.put(particles, particles.x, particles.v, start + self.stage * (end - start))
+
+
+NO_MOTIONS = Motions()
 
 
 def stage_of(solver: Solver) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from pointmass.errors import InvalidInput, finite_array, floats, shown, unknown
+from pointmass.skin import Skin
 from pointmass.tracing.noise import mixed
 
 Array = NDArray[np.floating[Any]]
@@ -104,10 +105,16 @@ class Surface:
     ----------
     triangles : ids of the corners, shape (k, 3).
     uv : place of each corner on the flat pattern, from 0 to 1 along both of its sides, shape (k, 3, 2).
+    areas : of the triangles as they were at the start [m^2], shape (k,).
+    inside : ids of particles of the solid that it bounds, which one does not see, shape (j,).
+    skin : what is drawn in place of the triangles; None = they.
     """
 
     triangles: NDArray[np.int64]
     uv: NDArray[np.float64]
+    areas: NDArray[np.float64]
+    inside: NDArray[np.int64]
+    skin: Skin | None = None
 
 
 class Particles:
@@ -167,6 +174,7 @@ class Particles:
         self.version = 0
         self._next_id = 0
         self._chance = -1, np.zeros(0)
+        self._pins = -1, False
         self._rooms: dict[str, tuple[NDArray[Any], int]] = {}  # memory of the columns, and up to where it is taken
         self._arrays = {name: np.zeros((0, 3), self.dtype) for name in "xvf"}
         self._arrays |= {name: np.zeros(0, self.dtype) for name in PLAIN}
@@ -184,20 +192,32 @@ class Particles:
 
     @property
     def pinned(self) -> NDArray[np.bool_]:
-        return _read_only(self._held.copy())
+        return read_only(self._held.copy())
+
+    @property
+    def next_id(self) -> int:
+        """The id of the particle that is added next."""
+        return self._next_id
+
+    @property
+    def has_pins(self) -> bool:
+        """Whether anybody is pinned."""
+        if self._pins[0] != self.version:
+            self._pins = self.version, bool(self._held.any())
+        return self._pins[1]
 
     @property
     def w(self) -> Array:
         w: Array = 1 / self.m
         w[self._held] = 0
-        return _read_only(w)
+        return read_only(w)
 
     @property
     def chance(self) -> Array:
         if self._chance[0] != self.version:
             low, high = self.id.astype(np.uint64), self.id.astype(np.uint64) >> np.uint64(32)
             bits = mixed(low ^ mixed(high)) >> np.uint64(8)
-            self._chance = self.version, _read_only((bits * 2.0**-24).astype(self.dtype))
+            self._chance = self.version, read_only((bits * 2.0**-24).astype(self.dtype))
         return self._chance[1]
 
     def add(
@@ -311,13 +331,22 @@ class Particles:
         self.groups[name] = mask
         self.version += 1
 
-    def cover(self, name: str, triangles: ArrayLike, uv: ArrayLike | None = None) -> None:
+    def cover(
+        self,
+        name: str,
+        triangles: ArrayLike,
+        uv: ArrayLike | None = None,
+        inside: ArrayLike | None = None,
+        skin: Skin | None = None,
+    ) -> None:
         """Give triangles between particles a name: they are drawn as a smooth surface, and wind may blow on them.
 
         Parameters
         ----------
         triangles : ids of the corners, shape (k, 3).
         uv : place of each corner on the flat pattern, shape (k, 3, 2); 0 by default.
+        inside : ids of particles of the solid that it bounds, which it hides, shape (j,); none by default.
+        skin : a smoother mesh, drawn in place of the triangles.
 
         Raises
         ------
@@ -333,7 +362,12 @@ class Particles:
                 f"a triangle of surface {name!r} has the corner {corners[gone][0]}, which does not exist"
             )
         places = np.zeros((*corners.shape, 2)) if uv is None else finite_array("uv", uv, (len(corners), 3, 2))
-        self.surfaces[name] = Surface(corners.astype(np.int64), places)
+        a, b, c = self.x[self.rows(corners).T].astype(np.float64)
+        areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        hidden = np.zeros(0, np.int64) if inside is None else np.asarray(inside)
+        if hidden.ndim != 1 or hidden.dtype.kind not in "iu" or (self.rows(hidden) < 0).any():
+            raise InvalidInput(f"inside of surface {name!r} must be ids of particles, not {shown(inside)}")
+        self.surfaces[name] = Surface(corners.astype(np.int64), places, areas, hidden.astype(np.int64), skin)
         self.version += 1
 
     def pin(self, which: Selection) -> None:
@@ -383,7 +417,11 @@ class Particles:
         result = given.astype(np.int64)
         # Later than all others, as most births are: that takes no search.
         later = bool(len(self) and result.size and result.min() > self.id.max())
-        if result.shape != (n,) or len(np.unique(result)) != n or not (later or (self.rows(result) < 0).all()):
+        if (
+            result.shape != (n,)
+            or not ((result[1:] > result[:-1]).all() or len(np.unique(result)) == n)
+            or not (later or (self.rows(result) < 0).all())
+        ):
             raise InvalidInput(f"id must be {n} whole numbers that no other particle has")
         return result
 
@@ -404,9 +442,11 @@ class Particles:
         return known[1]
 
     def _whole(self, surface: Surface) -> Surface:
-        """The triangles of which all corners are there."""
+        """The triangles of which all corners are there, and who is still inside."""
         here = (self.rows(surface.triangles) >= 0).all(axis=1)
-        return Surface(surface.triangles[here], surface.uv[here])
+        inside = surface.inside[self.rows(surface.inside) >= 0]
+        skin = surface.skin and surface.skin.kept(self.rows(surface.skin.nodes) >= 0)
+        return Surface(surface.triangles[here], surface.uv[here], surface.areas[here], inside, skin)
 
     def _longer(self, name: str, column: NDArray[Any], values: NDArray[Any]) -> NDArray[Any]:
         """A column with more rows, written into the room behind it if there is some left that nobody has written to."""
@@ -441,7 +481,8 @@ def _end(values: NDArray[Any]) -> int:
     return int(values.__array_interface__["data"][0]) + values.nbytes
 
 
-def _read_only(array: NDArray[Any]) -> NDArray[Any]:
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """The array, which nobody can write from now on."""
     array.flags.writeable = False
     return array
 

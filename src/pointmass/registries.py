@@ -7,6 +7,8 @@ from typing import Any
 
 from pointmass.bodies import BODIES
 from pointmass.collisions import COLLIDERS
+from pointmass.constraints import CONSTRAINTS
+from pointmass.controllers import CONTROLLERS
 from pointmass.emitters import EMITTERS
 from pointmass.forces import FORCES
 from pointmass.motions import MOTIONS
@@ -19,4 +21,6 @@ LISTS: Mapping[str, Mapping[str, Any]] = {
     "emitters": EMITTERS,
     "zones": ZONES,
     "motions": MOTIONS,
+    "constraints": CONSTRAINTS,
+    "controllers": CONTROLLERS,
 }

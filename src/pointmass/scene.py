@@ -7,15 +7,20 @@ so a scene written in Python can be saved as text, and a text gives the same sce
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from pointmass.beside import beside
 from pointmass.bodies import BODIES, Body, join
 from pointmass.collisions import COLLIDERS
 from pointmass.collisions.collider import Collider
+from pointmass.collisions.looked_up import LookedUp
+from pointmass.constraints import Constraint
+from pointmass.controllers import Controller
 from pointmass.description import Described
 from pointmass.emitters import Normal, Spread
 from pointmass.emitters.emitter import Emitter
@@ -30,6 +35,7 @@ from pointmass.motions import RigidMotion
 from pointmass.particles import Particles
 from pointmass.registries import LISTS
 from pointmass.simulation import DEFAULT_DT, Simulation
+from pointmass.solver_choice import AUTO
 from pointmass.solvers import SOLVERS, find_solver
 from pointmass.solvers.base import Solver
 from pointmass.system import ParticleSystem
@@ -41,6 +47,8 @@ PATHS = (".grid", ".mesh", ".heights", ".distances")  # parameters that may be p
 HOLDS: dict[str, type] = {
     **{"bodies": Body, "forces": Force, "colliders": Collider, "emitters": Emitter, "zones": Zone},
     "motions": RigidMotion,
+    "constraints": Constraint,
+    "controllers": Controller,
 }
 PLAIN = ("name", "summary", "dt", "frames", "fps", "seed", "dtype", "max_particles", "when_full")
 
@@ -56,7 +64,9 @@ class Scene:
     forces : on all particles, after the bodies' own.
     colliders, emitters, zones : surfaces, where particles come from, and where they die.
     motions : of pinned particles.
-    solver : None = SymplecticEuler, or RK4 for a flow.
+    constraints : what must hold at the end of each step.
+    controllers : what sets parameters of the forces between steps.
+    solver : None = SymplecticEuler, or RK4 for a flow; "auto" = chosen at the start, see `Simulation`.
     dt : the solver's step [s].
     frames, fps : length of the run, and looks per second, where nothing else is asked for.
     seed : of all chance while it runs.
@@ -81,7 +91,7 @@ class Scene:
     dtype: str = "float64"
     max_particles: int | None = None
     when_full: WhenFull = "no birth"
-    solver: Solver | None = None
+    solver: Solver | Literal["auto"] | None = None
     bodies: Sequence[Body] = ()
     names: Sequence[str] = ()
     forces: Sequence[Force] = ()
@@ -89,6 +99,8 @@ class Scene:
     emitters: Sequence[Emitter] = ()
     zones: Sequence[Zone] = ()
     motions: Sequence[RigidMotion] = ()
+    constraints: Sequence[Constraint] = ()
+    controllers: Sequence[Controller] = ()
     camera: Camera = field(default_factory=Camera)
     look: Look = field(default_factory=Look)
 
@@ -105,7 +117,7 @@ class Scene:
             raise unknown("value of when_full:", self.when_full, WHEN_FULL)
         for what, kind in HOLDS.items():
             setattr(self, what, _items(what, kind, getattr(self, what)))
-        if self.solver is not None and not isinstance(self.solver, Solver):
+        if self.solver not in (None, AUTO) and not isinstance(self.solver, Solver):
             raise InvalidInput(f"solver must be a solver, such as pm.RK4(), not {self.solver!r}")
         for what, settings in (("camera", Camera), ("look", Look)):
             if not isinstance(getattr(self, what), settings):
@@ -132,7 +144,7 @@ class Scene:
         for k, force in enumerate(forces):
             force.label = f"forces.{k} ({force.name})"
         system = ParticleSystem(particles, own + forces, [_again(c) for c in self.colliders])
-        solver = None if self.solver is None else _again(self.solver)
+        solver = _again(self.solver) if isinstance(self.solver, Solver) else self.solver
         return Simulation(
             system,
             solver,
@@ -140,6 +152,8 @@ class Scene:
             emitters=emitters,
             zones=[_again(z) for z in self.zones],
             motions=[_again(m) for m in self.motions],
+            constraints=[_again(c) for c in self.constraints],
+            controllers=[_again(c) for c in self.controllers],
             max_particles=self.max_particles,
             when_full=self.when_full,
             look=self.look,
@@ -165,7 +179,9 @@ class Scene:
             value = getattr(self, f.name)
             if f.name in PLAIN and (value != f.default or f.name == "name"):
                 result[f.name] = value
-        if self.solver is not None:
+        if self.solver == AUTO:
+            result["solver"] = AUTO
+        elif self.solver is not None:
             result["solver"] = _table(SOLVERS, self.solver, "solver", folder)
         for what, registry in LISTS.items():
             tables = [_table(registry, item, what, folder) for item in getattr(self, what)]
@@ -186,12 +202,8 @@ class Scene:
         """Write the scene as TOML, beside and renamed."""
         path = Path(path)
         text = self.to_toml(path.parent.resolve())
-        part = path.with_name(path.name + ".part")
-        try:
+        with beside(path) as part:
             part.write_text(text, encoding="utf-8")
-            part.replace(path)
-        except OSError as error:
-            raise InvalidInput(f"cannot write {str(path)!r}: {error.strerror}") from None
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scene) and self.document() == other.document()
@@ -287,6 +299,8 @@ def _items(what: str, kind: type, value: Any) -> list[Any]:
 
 def _again(item: Any) -> Any:
     """An equal object without a history."""
+    if isinstance(item, LookedUp):  # it has none, and what it looks up in takes long to build
+        return copy(item)
     fresh = type(item)(**item.arguments)
     if isinstance(item, Force):
         fresh.enabled = item.enabled
@@ -350,7 +364,8 @@ def _name(item: Any) -> str:
 def _plain(value: Any, where: str, folder: Path | None) -> Any:
     """Numbers, strings, lists and tables only."""
     if isinstance(value, TriangleMesh):
-        return [value.vertices.tolist(), value.faces.tolist()]
+        places = [] if value.uv is None else [value.uv.reshape(-1, 6).tolist()]  # u and v of each corner of a face
+        return [value.vertices.tolist(), value.faces.tolist(), *places]
     if isinstance(value, Grid):
         return _plain_grid(value, where, folder)
     if isinstance(value, (Spread, Normal)):
@@ -433,9 +448,9 @@ def _found(name: str, path: str, folder: Path | None) -> str:
     return path if folder is None else str((folder / path).resolve())
 
 
-def _made_solver(value: Any) -> Solver | None:
-    if value is None:
-        return None
+def _made_solver(value: Any) -> Solver | Literal["auto"] | None:
+    if value is None or value == AUTO:
+        return None if value is None else "auto"
     values = {"type": value} if isinstance(value, str) else dict(value)
     return find_solver(values.pop("type"))(**values)
 

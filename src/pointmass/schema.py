@@ -28,6 +28,7 @@ from pointmass.laws.unary import VelocityField
 from pointmass.look import OF_PARTICLES, Look
 from pointmass.registries import LISTS
 from pointmass.simulation import DEFAULT_DT
+from pointmass.solver_choice import AUTO
 from pointmass.solvers import ALIASES, SOLVERS, find_solver
 from pointmass.zones import WHEN_FULL
 
@@ -86,6 +87,7 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
     "ArrayLike": (list[list[int]], "a list of lists of particle ids, such as [[0, 1], [1, 2]]"),
     "Axis": (Row | str, "three numbers, such as [0, 1, 0], or 'normal'"),
     "Chance": (CHANCE, f"a number, or {SPREAD}"),
+    "Families": (str | list[str], "the name of a family of springs, such as 'stretch', or a list of names"),
     "Grid | str": (str | GridTable, "the path of a file, or a table with its path"),
     "DistanceSource": (str | list[list[list[float]]], "the path of a file, or rows of rows of distances"),
     "HeightSource": (str | list[list[float]], "the path of a file, or a list of rows of heights"),
@@ -96,9 +98,11 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
         list[_exactly(2, float)],  # type: ignore[misc]
         "a list of times and counts, such as [[0, 100], [0.5, 200]]",
     ),
+    "Surfaces": (str | list[str], "the name of a surface or body, such as 'cloth', or a list of names"),
+    "str | Sequence[str]": (str | list[str], "a name, or a list of names"),
     "TriangleSource": (
-        str | _exactly(2, list[list[float]]),
-        "the path of a file, or a list of vertices and a list of faces",
+        str | _exactly(2, list[list[float]]) | _exactly(3, list[list[float]]),
+        "the path of a file, or a list of vertices, a list of faces, and if wanted one of places of their corners",
     ),
     "Triangles": (
         str | list[list[int]],
@@ -141,7 +145,7 @@ def model() -> type[Table]:
         what: (list[_one_of(what, tuple(registry))], Field(default=[], description=_LIST_DOCS[what]))  # type: ignore[misc]
         for what, registry in LISTS.items()
     }
-    names: Any = Literal[(*SOLVERS, *ALIASES)]
+    names: Any = Literal[(*SOLVERS, *ALIASES, AUTO)]
     solver: Any = Union[names, _one_of("solver", tuple(SOLVERS))]  # noqa: UP007
     dtype: Any = Literal[DTYPES]
     full: Any = Literal[WHEN_FULL]
@@ -158,7 +162,7 @@ def model() -> type[Table]:
         dtype=(dtype, Field(default=DTYPES[0], description="precision of the numbers")),
         max_particles=(int, Field(default=None, ge=1, description="how many there may be; any number by default")),
         when_full=(full, Field(default=WHEN_FULL[0], description="what happens beyond max_particles")),
-        solver=(solver, Field(default=None, description="symplectic_euler by default, rk4 for a flow")),
+        solver=(solver, Field(default=None, description="symplectic_euler by default, rk4 for a flow; auto = chosen")),
         camera=(settings_model("camera"), Field(default={}, description="what a picture shows")),
         look=(settings_model("look"), Field(default={}, description="how it looks")),
         **lists,
@@ -295,6 +299,8 @@ _LIST_DOCS = {
     "emitters": "where particles come from",
     "zones": "where particles die",
     "motions": "of pinned particles",
+    "constraints": "what must hold at the end of each step",
+    "controllers": "what sets parameters of the forces between steps",
 }
 
 
@@ -367,7 +373,7 @@ def _check_entry(where: str, what: str, table: Any, registry: Mapping[str, Any])
 
 
 def _check_solver(value: Any) -> None:
-    if value is None:
+    if value is None or value == AUTO:
         return
     kind = value.get("type") if isinstance(value, Mapping) else value
     if not isinstance(kind, str):

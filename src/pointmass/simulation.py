@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import warnings
 from collections.abc import Iterator, Sequence
@@ -10,21 +11,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pointmass.constraints.constraint import Constraint, Step, between
+from pointmass.controllers.controller import Controller
 from pointmass.deaths import Deaths
 from pointmass.emitters.emitter import Birth, Emitter
 from pointmass.engine.engine import Engine, compiled_by_default
 from pointmass.engine.island import Span
 from pointmass.engine.kernels import grow_old
-from pointmass.errors import Diverged, InvalidInput, UnstableStep, number, shown, unknown, whole_number
+from pointmass.errors import Diverged, DividedStep, InvalidInput, UnstableStep, number, shown, unknown, whole_number
 from pointmass.frame import Frame
 from pointmass.lineage import Lineage
 from pointmass.look import Look, Stage
-from pointmass.motions import RigidMotion, stage_of
+from pointmass.motions import Motions, RigidMotion
 from pointmass.particles import Array
+from pointmass.solver_choice import AUTO, chosen
 from pointmass.solvers import as_solver
 from pointmass.solvers.advance import advance
 from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.control import control_of
+from pointmass.stability import safe_bound
 from pointmass.step_warning import too_long
 from pointmass.system import ParticleSystem
 from pointmass.zones import WHEN_FULL, WhenFull, Zone, killed, oldest, with_room
@@ -35,6 +40,7 @@ DEFAULT_DT = 1 / 240  # 60 frames a second with 4 substeps
 RUNAWAY = 1e6  # times the speeds seen so far that are explained: somebody this fast is looked at
 AGREE = 0.1  # of a speed: a step and two half steps that differ by more follow no motion
 MANY_AGED = 1e6  # particle-steps, beyond which ages are worth a kernel
+MANY_MOTIONS = 2000  # particles, beyond which the largest stable dt is not sought, but one that is surely stable
 ON_GRID = 1e-9  # of a step: a frame this near to the grid is on it
 
 
@@ -44,12 +50,15 @@ class Simulation:
     Parameters
     ----------
     system : belongs to the simulation from now on.
-    solver : a solver or the name of one; SymplecticEuler() by default, RK4() for a flow.
+    solver : a solver or the name of one; SymplecticEuler() by default, RK4() for a flow. "auto" chooses one by the
+        system's fastest motion and dt: `solver_reason` says which and why, as does the logger "pointmass".
     dt : the solver's step [s], on the grid t0 + k dt with whole k; 1/240 by default. An adaptive solver makes steps
         of its own in between. How often frames are looked at changes nothing.
     emitters : where particles come from.
     zones : where particles die.
     motions : of pinned particles.
+    constraints : what must hold at the end of each step, in the order in which it is made to.
+    controllers : what sets parameters of the forces between steps, in this order.
     max_particles : how many there may be at the end of a step; None = any number.
     when_full : what happens beyond them: "no birth", first come, first served; or "oldest dies", of those that emitters
         have made.
@@ -64,6 +73,7 @@ class Simulation:
     t : time now [s].
     steps : how many steps of dt were made.
     engine : what makes them.
+    solver, solver_reason : what solves, and why it was chosen, if it was.
 
     Raises
     ------
@@ -87,6 +97,8 @@ class Simulation:
         emitters: Sequence[Emitter] = (),
         zones: Sequence[Zone] = (),
         motions: Sequence[RigidMotion] = (),
+        constraints: Sequence[Constraint] = (),
+        controllers: Sequence[Controller] = (),
         max_particles: int | None = None,
         when_full: WhenFull = "no birth",
         look: Look | None = None,
@@ -96,8 +108,12 @@ class Simulation:
         if not isinstance(system, ParticleSystem):
             raise InvalidInput(f"system must be a pm.ParticleSystem, not {shown(system)}")
         self.system = system
-        self.solver = as_solver(solver or ("symplectic_euler" if system.order == 2 else "rk4"))
         self.dt = number("dt", dt, above=0, unit="s")
+        self.solver_reason = ""
+        if solver == AUTO:
+            solver, self.solver_reason = chosen(system, self.dt)
+            logging.getLogger("pointmass").info("solver %s", self.solver_reason)
+        self.solver = as_solver(solver or ("symplectic_euler" if system.order == 2 else "rk4"))
         self.seed = whole_number("seed", seed, at_least=0)
         self.emitters = list(emitters)
         for emitter in self.emitters:
@@ -109,8 +125,14 @@ class Simulation:
             if not isinstance(zone, Zone):
                 raise InvalidInput(f"zones must be zones, such as pm.SphereZone(), not {shown(zone)}")
         self.motions = list(motions)
-        self._led = math.nan  # time at which they were put where they are
-        self._bind_motions()
+        if self.motions and system.order == 1:
+            raise InvalidInput("motions lead pinned masses, and a flow has none: give the motion to its field")
+        self._led = Motions.of(self.motions, self.solver, system.particles, system.t)
+        self.constraints = list(constraints)
+        self._bind_constraints()
+        self._made: Step | None = None  # the last step, if there are constraints
+        self.controllers = list(controllers)
+        self._bind_controllers()
         self.max_particles = None
         if max_particles is not None:
             self.max_particles = whole_number("max_particles", max_particles, at_least=1)
@@ -122,7 +144,8 @@ class Simulation:
         self.steps = 0
         self.frames_seen = 0
         wanted = compiled_by_default() if compiled is None else compiled
-        self.engine = Engine(system, self.solver, wanted, watched=any(e.at_impacts for e in self.emitters))
+        watched, lasting = any(e.at_impacts for e in self.emitters), not any(c.breaks_up for c in self.constraints)
+        self.engine = Engine(system, self.solver, wanted, watched=watched, lasting=lasting, motions=self._led)
         for reason in self.engine.missing() if self.engine.wanted else ():
             warnings.warn(f"this run is not compiled, because {reason}", stacklevel=2)
         self._lineage = Lineage(self.emitters, self.zones)
@@ -133,7 +156,7 @@ class Simulation:
         self._deaths = Deaths()
         self._deaths.add(p.id, self.t0 + (p.lifetime - p.age))
         self._speed_limit = RUNAWAY * self._natural_speed()
-        self._looked_at_step = False
+        self._looked_at_step = self._told_of_parts = False
 
     @property
     def t(self) -> float:
@@ -155,6 +178,8 @@ class Simulation:
         -----
         UnstableStep
             Once, before the first step: dt is too long for the springs at the start.
+        DividedStep
+            Once: the equations of an implicit step were not solved, and it was divided (`engine.stats.rejected`).
         """
         end = self.steps + whole_number("count", count, at_least=0)
         while self.steps < end:
@@ -166,6 +191,32 @@ class Simulation:
         A thread may prepare a copy of a simulation, with other forces, while this one runs.
         """
         self.engine.prepare()
+
+    def change(self, solver: Solver | str | None = None, dt: float | None = None) -> None:
+        """Go on from now with another solver or step; None = as before.
+
+        The clock's grid begins anew: `t0` is now, and `steps` counts from there.
+
+        Raises
+        ------
+        InvalidInput
+            dt that is not positive, something that is not a solver, a solver of masses for a flow. Nothing has changed.
+        """
+        dt = self.dt if dt is None else number("dt", dt, above=0, unit="s")
+        reason = ""
+        if solver == AUTO:
+            solver, reason = chosen(self.system, dt)
+        made = self.solver if solver is None else as_solver(solver)
+        if self.system.order == 1 and made.moves_masses:
+            raise InvalidInput(f"solver = {made.name} is not allowed: it moves masses, and a flow has none; use rk4")
+        self.t0, self.steps, self.dt = self.t, 0, dt
+        self.solver, self.solver_reason = made, reason
+        self.engine = self.engine.of(self.system, made)
+        self._led = self.engine.motions
+        self._looks = self.t0, 0, 1.0
+        self._made = None
+        self._controlled = -1
+        self._looked_at_step = False
 
     def run(self, seconds: float) -> None:
         """Make the steps that it takes to come `seconds` [s] further; the last one may end a little later.
@@ -208,9 +259,9 @@ class Simulation:
                 f"t = {t} is not allowed: only the last step, which ended at {self.t} s, can be looked at"
             )
         p = system.particles
-        x, v = system.split(self.engine.state_at(now)) if now < self.t else (p.x, p.v)
+        x, v = self._state_at(now) if now < self.t else (p.x, p.v)
         if now < self.t:
-            self._put(x, v, now)
+            self._led.put(p, x, v, now)
         self._stage.trails.remember(now, p.id, x)
         v = self._velocities(now, x, v)
         drawables = self.look.drawables(system, now, x, v, number, self._stage)
@@ -226,16 +277,19 @@ class Simulation:
 
     def births(self, step: int) -> list[Birth]:
         """Who is born in a step without parents, of each emitter; nothing is changed."""
-        t0, t1 = self._grid(step), self._grid(step + 1)
-        return [e.births(t0, t1, self.seed, stream) for e, stream in zip(self.emitters, self._streams, strict=True)]
+        return self._births(Span(self.t0, self.dt, step, 1))[0]
 
     def quantities(self) -> dict[str, float]:
-        """Diagnostics now: energies [J], momentum [kg m/s], largest relative stretch of a spring, particle count."""
+        """Diagnostics now: energies [J], momentum [kg m/s], largest relative stretch of a spring, particle count.
+
+        `potential_NAME` is the part of the forces of a name, such as `potential_gravity`.
+        """
         system = self.system
         result = {"particles": float(len(system.particles))}
         if system.order == 2:
             energy, momentum = system.energy(self.engine.pair_energies()), system.momentum()
             result |= {"energy": energy.total, "kinetic": energy.kinetic, "potential": energy.potential}
+            result |= {f"potential_{name}": part for name, part in energy.by_force.items()}
             result |= {f"momentum_{a}": float(q) for a, q in zip("xyz", momentum, strict=True)}
             result["stretch"] = system.stretch()
         return result
@@ -257,13 +311,14 @@ class Simulation:
             problem = too_long(self.system, self.solver, self.dt)
             if problem is not None:
                 warnings.warn(problem, UnstableStep, stacklevel=3)
+        most = min(most, self._control())
         if not self.engine.compiled:
             self._step()
             return
         changes = self.emitters or self._deaths or self.engine.deadly
         parents_killed = self.engine.deadly and self._lineage.followed
         single = (changes and self.engine.coupled) or parents_killed or self.max_particles is not None
-        single = single or bool(self.zones or self.motions)
+        single = single or bool(self.zones or self.constraints)
         span = Span(self.t0, self.dt, self.steps, 1 if single else min(most, self.engine.longest()))
         try:
             born = self._born(span, compiled=True)
@@ -272,16 +327,30 @@ class Simulation:
             return
         old = len(self.system.particles)
         clock = self._bear(born, span.start)
-        self._lead_within(span)
-        if self.engine.run(span, self._started(clock, span.start), look_inside) and self._slow_enough():
-            self._lead(span.end)
+        made = self._beginning(span)
+        if (
+            self.engine.run(span, self._started(clock, span.start), look_inside)
+            and self._slow_enough()
+            and self._enforced(made)
+        ):
             self._age(span, clock, old)
             self.steps += span.count
             self._bury(born, span.end)
+            self._tell_of_parts()
             return
         self.engine.restore()
         self.system.remove(np.arange(old, len(self.system.particles)))
         self._stepwise(span)
+
+    def _control(self) -> int:
+        """Let the controllers look whose time has come; returns after how many steps the next one does."""
+        periods = [controller.every(self.dt) for controller in self.controllers]
+        if self._controlled != self.steps:
+            self._controlled = self.steps
+            for controller, period in zip(self.controllers, periods, strict=True):
+                if self.steps % period == 0:
+                    controller.control(self.system, self.t)
+        return min((period - self.steps % period for period in periods), default=self.engine.longest())
 
     def _stepwise(self, span: Span) -> None:
         """Make a span step by step, to see what goes wrong and where."""
@@ -297,12 +366,13 @@ class Simulation:
         except Diverged as error:
             raise self._explained(error) from error
         clock = self._bear(born, span.start)
+        made = self._beginning(span)
         start = self._started(clock, span.start)
-        self._lead_within(span)
         before = self.system.get_state()
         try:
             self.engine.step(span, start)
             self._check_speed(before)
+            self._enforce(made)
         except Diverged as error:
             self.system.set_state(before, span.start)
             explained = self._explained(error)
@@ -312,48 +382,88 @@ class Simulation:
             self.system.set_state(before, span.start)
             self.system.remove(np.arange(old, len(self.system.particles)))
             raise
-        self._lead(span.end)
         self._age(span, clock, old)
         self.steps += 1
         self._bury(born, span.end)
+        self._tell_of_parts()
 
-    def _bind_motions(self) -> None:
-        p = self.system.particles
-        for motion in self.motions:
-            if not isinstance(motion, RigidMotion):
-                raise InvalidInput(f"motions must be motions, such as pm.RigidMotion(), not {shown(motion)}")
+    def _tell_of_parts(self) -> None:
+        """Say once that implicit steps are not solved as they are."""
+        count = self.engine.stats.rejected
+        if self.solver.implicit and count and not self._told_of_parts:
+            self._told_of_parts = True
+            warnings.warn(
+                f"before t = {self.t:.6g} s the equations of {self.solver.name} were not solved in a step of"
+                f" {self.dt:.3g} s, so it was made in parts ({count} divisions so far): a smaller dt or a larger"
+                " tolerance is faster",
+                DividedStep,
+                stacklevel=4,
+            )
+
+    def _bind_constraints(self) -> None:
+        for constraint in self.constraints:
+            if not isinstance(constraint, Constraint):
+                raise InvalidInput(f"constraints must be constraints, not {shown(constraint)}")
             if self.system.order == 1:
-                raise InvalidInput("motions lead pinned masses, and a flow has none: give the motion to its field")
-            motion.bind(p, self.system.t)
-        led, times = np.unique(np.concatenate([[-1], *(m.ids for m in self.motions)]), return_counts=True)
-        if (times > 1).any():
-            raise InvalidInput(f"two motions lead particle {int(led[times > 1][0])}: give each motion its own")
+                raise InvalidInput("constraints move masses, and a flow has none: leave them out")
+            constraint.bind(self.system)
 
-    def _lead(self, t: float) -> None:
-        """Put the pins that move where they are at time t, if they are not there: a step may begin where one ended."""
-        if t != self._led:
-            self._put(self.system.particles.x, self.system.particles.v, t)
-            self._led = t
+    def _bind_controllers(self) -> None:
+        for controller in self.controllers:
+            if not isinstance(controller, Controller):
+                raise InvalidInput(f"controllers must be controllers, not {shown(controller)}")
+            controller.bind(self.system, self.seed)
+        self._controlled = -1  # the last step before which they have looked
 
-    def _lead_within(self, span: Span) -> None:
-        """Put them where the solver wants to see them in a step; it may leave them in any state."""
-        self._lead(span.start + stage_of(self.solver) * (span.end - span.start))
-        self._led = math.nan
+    def _beginning(self, span: Span) -> Step | None:
+        """What constraints have to know of a step before it is made."""
+        if not self.constraints:
+            return None
+        p = self.system.particles
+        return Step(span.start, span.end, p.id, p.x.copy(), p.v.copy())
 
-    def _put(self, x: Array, v: Array, t: float) -> None:
-        for motion in self.motions:
-            rows, led = motion.rows(self.system.particles)
-            for column, values in zip((x, v), motion.at(t), strict=True):
-                column[rows] = values[led]
+    def _enforce(self, made: Step | None) -> None:
+        """Make the constraints hold after a step."""
+        if made is not None:
+            try:
+                for constraint in self.constraints:
+                    constraint.enforce(self.system, made)
+            except Diverged:
+                self.system.remove(np.arange(len(made.ids), len(self.system.particles)))  # who came off in this step
+                raise
+            self._made = made
+
+    def _enforced(self, made: Step | None) -> bool:
+        """The same for kernels: False if it cannot be."""
+        try:
+            self._enforce(made)
+        except Diverged:
+            return False
+        return True
+
+    def _state_at(self, t: float) -> tuple[Array, Array]:
+        """Positions and velocities within the last step."""
+        if self._made is not None:
+            return between(self._made, self.system.particles, t)
+        return self.system.split(self.engine.state_at(t))
 
     @property
     def _streams(self) -> list[str]:
         """Names of the emitters, by which each has a chance of its own."""
         return [f"{type(e).__name__} {k}" for k, e in enumerate(self.emitters)]
 
+    def _births(self, span: Span) -> Born:
+        """Who is born without parents: drawn for all steps of a span at once."""
+        times = np.array([span.time(k) for k in range(span.count + 1)])
+        whole = [
+            e.births(span.start, span.end, self.seed, s) for e, s in zip(self.emitters, self._streams, strict=True)
+        ]
+        parts = [births.parted(times) for births in whole]
+        return [[steps[k] for steps in parts] for k in range(span.count)]
+
     def _born(self, span: Span, compiled: bool) -> Born:
         """Who is born in each step of a span, of each emitter."""
-        born = [self.births(span.first + k) for k in range(span.count)]
+        born = self._births(span)
         born = self._lineage.foresee(self.engine, span, born, compiled, self.seed, self._streams)
         if self.max_particles is not None and self.when_full == "no birth":
             room = self.max_particles - len(self.system.particles)
@@ -388,8 +498,13 @@ class Simulation:
         return np.where(early, t0, clock)
 
     def _age(self, span: Span, clock: Array | None, old: int) -> None:
-        """Let all grow older by a span; those beyond the first `old` were born in it, each at its clock."""
-        age = self.system.particles.age
+        """Let all grow older by a span.
+
+        Those beyond the first `old` were born in it, each at its clock; those beyond all clocks came off others at its
+        end, and are as old as they were at its start.
+        """
+        p = self.system.particles
+        age, many = p.age, old if clock is None else len(clock)
         steps = [(span.time(k), span.time(k + 1)) for k in range(span.count)]
         if old * span.count > MANY_AGED:
             grow_old(age[:old], np.array([t1 - t0 for t0, t1 in steps]).astype(age.dtype))
@@ -398,7 +513,10 @@ class Simulation:
                 age[:old] += np.asarray(t1 - t0, age.dtype)
         if clock is not None:
             for t0, t1 in steps:
-                age[old:] += np.asarray(t1 - np.clip(clock[old:], t0, t1), age.dtype)
+                age[old:many] += np.asarray(t1 - np.clip(clock[old:], t0, t1), age.dtype)
+        if many < len(p):
+            age[many:] += np.asarray(span.end - span.start, age.dtype)
+            self._deaths.add(p.id[many:], span.end + (p.lifetime - age)[many:])
 
     def _bury(self, born: Born, t1: float) -> None:
         """Take away those whose time has come by t1, whom a surface killed, who are in a zone, and who are too many."""
@@ -408,13 +526,14 @@ class Simulation:
         self._lineage.settle(born, t1)
         p = self.system.particles
         rows = p.rows(np.append(self._deaths.due(t1), self._lineage.taken))
-        gone = killed(self.zones, p.x, t1, p.age > 0) if self.zones else np.zeros(len(p), bool)
-        gone[self.engine.died] = True
-        spared = p.rows(self._lineage.spared)
-        gone[spared[spared >= 0]] = False
-        gone[rows[rows >= 0]] = True
-        if gone.any():
-            self.system.remove(gone)
+        if self.zones or len(self.engine.died) or len(rows):
+            gone = killed(self.zones, p.x, t1, p.age > 0) if self.zones else np.zeros(len(p), bool)
+            gone[self.engine.died] = True
+            spared = p.rows(self._lineage.spared)
+            gone[spared[spared >= 0]] = False
+            gone[rows[rows >= 0]] = True
+            if gone.any():
+                self.system.remove(gone)
         if self.max_particles is not None and len(p) > self.max_particles:
             self.system.remove(oldest(p, len(p) - self.max_particles))
 
@@ -492,9 +611,9 @@ class Simulation:
         where = f"particle {p.id[row]}" if len(p) else "no particle"
         if partners:
             where += f" and particle {', '.join(str(p.id[r]) for r in partners[:3])}"
-        limit = self._largest_safe_dt()
+        limit, exact = self._largest_safe_dt()
         reason, _, own = str(error).partition(": ")
-        advice = self._advice(singular, limit) or own or "use a smaller dt or softer forces"
+        advice = self._advice(singular, limit, exact) or own or "use a smaller dt or softer forces"
         return Diverged(
             f"diverged in step {self.steps} (t = {self.t:.6g} s) at {where}, force {force}: {advice} ({reason})",
             particle=int(p.id[row]) if len(p) else None,
@@ -504,25 +623,41 @@ class Simulation:
             largest_safe_dt=limit,
         )
 
-    def _advice(self, singular: bool, limit: float | None) -> str:
-        """What to do, where the forces tell; else an empty string."""
+    def _advice(self, singular: bool, limit: float | None, exact: bool) -> str:
+        """What to do, where the forces tell; else an empty string.
+
+        Parameters
+        ----------
+        exact : whether the limit is the largest stable dt, not a bound that is below it.
+        """
         if singular:
             return "it has no finite value there, so soften it or keep particles away"
         if limit == 0:
             return f"{self.solver.name} amplifies this motion at any dt: use symplectic_euler, rk4 or implicit_euler"
+        if limit is not None and limit < self.dt and not exact:
+            return (
+                f"{self.solver.name} bears the stiffness of these forces up to a dt of at least {limit:.3g} s, and dt"
+                f" is {self.dt:.3g} s"
+            )
         if limit is not None and limit < self.dt:
             return f"the largest stable dt of {self.solver.name} is {limit:.3g} s and dt is {self.dt:.3g} s"
         return ""
 
-    def _largest_safe_dt(self) -> float | None:
-        """From the stiffnesses at the start of the run, before anything was torn apart."""
+    def _largest_safe_dt(self) -> tuple[float | None, bool]:
+        """From the stiffnesses at the start of the run, before anything was torn apart, and whether it is exact.
+
+        Of many particles it is a step that is safe, as all their motions take minutes to find.
+        """
         system = self.system
+        exact = system.order == 1 or len(system.particles) <= MANY_MOTIONS
         now = system.get_state()
         system.set_state(self._start if self._start.shape == now.shape else now)
         try:
-            return system.stability(self.solver).largest_safe_dt
+            if exact:
+                return system.stability(self.solver).largest_safe_dt, exact
+            return safe_bound(system, self.solver), exact
         except InvalidInput:
-            return None
+            return None, exact
         finally:
             system.set_state(now)
 

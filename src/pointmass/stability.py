@@ -6,13 +6,23 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.element_motion import Element, ElementMotions, bent, element_blocks, element_motions
+from pointmass.element_motion import (
+    Element,
+    ElementMotions,
+    bent,
+    element_blocks,
+    element_motions,
+    element_sums,
+)
 from pointmass.errors import InvalidInput
+from pointmass.laws.elements import ElementForce
+from pointmass.laws.force import Blocks
+from pointmass.laws.unary import UnaryForce
 from pointmass.solvers.base import Array, Solver
 from pointmass.solvers.stability import Complex, largest_safe_step, largest_safe_steps, safe_step
 
@@ -27,6 +37,9 @@ STANDING = 1e-6  # of the fastest motion: slower ones are round-off of those tha
 SMALL = 200  # dimension up to which all motions are found to get one
 VECTOR = 1e-4  # residual of the motion that elements carry: their energies are off by its square
 NOTHING = 1e-3  # of what the first one carries: who has less is not named
+PARTS = 12  # of the largest stiffness and damping that are tried
+NOT_FINITE = "the forces are not finite where the particles are now: there is no largest step"
+NOT_FOUND = "the highest frequency of this system could not be found: try a smaller part of it"
 ITERATION: dict[str, Any] = {"ncv": 80, "maxiter": 100, "tol": ACCURACY}
 
 
@@ -108,6 +121,39 @@ def stability(system: ParticleSystem, solver: Solver) -> Stability:
     )
 
 
+def safe_bound(system: ParticleSystem, solver: Solver) -> float | None:
+    """A step with which stiffness and damping amplify no motion [s], found in a moment: safe, but not the longest one.
+
+    With the matrices K_e of the elements e, for x and v times the root of the mass, a motion x has no more energy than
+
+        x . K x = sum_e x_e . K_e x_e <= sum_i |x_i|^2 sum_(e at i) |K_e|,
+
+    so all stiffnesses, and likewise all dampings, are below the largest of these sums over the elements at a particle,
+    |K_e| being the root of the sum of squares. The bound of a cloth is some 0.6 of its longest step.
+
+    Returns
+    -------
+    float or None
+        inf = any; None where this tells nothing: forces that are not on elements or single particles, a flow.
+
+    Raises
+    ------
+    InvalidInput
+        A parameter is not allowed now, or the forces are not finite.
+    """
+    with limiting(system, solver):
+        known = all(isinstance(force, (ElementForce, UnaryForce)) for force in system.forces if force.enabled)
+        if system.order == 1 or not known:
+            return None
+        sums = element_sums(system) + _own_norms(system)
+    if not np.isfinite(sums).all():
+        raise InvalidInput(NOT_FINITE)
+    stiffness, damping = sums.max(axis=1, initial=0.0)
+    parts = np.linspace(0.0, 1.0, PARTS)
+    step = largest_safe_step(solver, np.repeat(parts, PARTS) * stiffness, np.tile(parts, PARTS) * damping)
+    return step if step > 0.0 or damping == 0.0 else None
+
+
 def limiting(system: ParticleSystem, solver: Solver) -> AbstractContextManager[None]:
     """Inside, only those forces act that limit the steps of a solver: XPBD takes elastic elements of any stiffness."""
     return system.slack() if solver.relaxes else nullcontext()
@@ -157,7 +203,7 @@ def _linearised(system: ParticleSystem) -> Any:
     state[: 3 * len(system.particles)] = bent(system).ravel()
     matrix = system.jacobian(system.t, state).astype(np.float64)
     if not np.isfinite(matrix.data).all():
-        raise InvalidInput("the forces are not finite where the particles are now: there is no largest step")
+        raise InvalidInput(NOT_FINITE)
     if system.order == 1:
         return matrix
     held = ~np.isfinite(system.inertia)
@@ -167,6 +213,19 @@ def _linearised(system: ParticleSystem) -> Any:
     scaled = entries.data * root[row] / root[column]  # x' = v stays exactly that
     scaled[held[column]] = 0.0  # who is held moves nobody, and all that moves keeps its eigenvalue
     return csr_array((scaled, (row, column)), shape=matrix.shape)
+
+
+def _own_norms(system: ParticleSystem) -> Array:
+    """Norms of what forces on single particles add to the stiffness and to the damping of each, shape (2, n)."""
+    p, blocks = system.particles, Blocks()
+    for force in system.forces:
+        if isinstance(force, UnaryForce) and force.enabled:
+            force.add_jacobian(p, system.t, p.x, p.v, blocks)
+    sums = np.zeros((2, len(p), 3, 3))
+    for rows, dx, dv in blocks.own:
+        sums[:, rows] += dx, dv
+    norms: Array = np.sqrt((sums * sums).sum(axis=(2, 3))) * np.where(p.pinned, 0.0, p.w)
+    return norms
 
 
 def _elements(system: ParticleSystem, solver: Solver, matrix: Any, limit: float) -> tuple[ElementMotions, ...]:
@@ -187,15 +246,13 @@ def _elements(system: ParticleSystem, solver: Solver, matrix: Any, limit: float)
 
 def _strongest(matrix: Any, islands: NDArray[np.intp]) -> Array:
     """Eigenvector of the largest eigenvalue, in one island: others that are alike move for themselves."""
-    from scipy.sparse.linalg import eigsh
-
     size = matrix.shape[0]
     if not matrix.count_nonzero():
         return np.zeros(size)
     if size <= SMALL:
         vector = np.linalg.eigh(matrix.toarray())[1][:, -1]
     else:
-        vector = eigsh(matrix, k=1, which="LA", v0=np.cos(np.arange(size)), tol=VECTOR)[1][:, 0]
+        vector = _symmetric_modes(matrix, 1, "LA", VECTOR)[1][:, 0]
     mine = islands == np.bincount(islands, vector * vector).argmax()
     vector = np.where(mine, vector, 0.0)
     return np.asarray(vector / np.linalg.norm(vector))
@@ -262,7 +319,7 @@ def _extreme(matrix: Any, order: int) -> Modes:
             found.append((error.eigenvalues, error.eigenvectors))
     values = np.concatenate([each for each, _ in found]).astype(complex)
     if not len(values):
-        raise InvalidInput("the highest frequency of this system could not be found: try a smaller part of it")
+        raise InvalidInput(NOT_FOUND)
     vectors = np.concatenate([each for _, each in found], axis=1)
     growth = float(values.real.max(initial=0.0))
     return _first_order(values, growth) if order == 1 else _damped(values, vectors[:n], damping, growth)
@@ -270,17 +327,25 @@ def _extreme(matrix: Any, order: int) -> Modes:
 
 def _stiffest(pull: Any, damping: Any) -> Modes:
     """The motions of largest stiffness and of largest damping: modes where they share them, else close to some."""
-    from scipy.sparse.linalg import eigsh
-
-    start = np.cos(np.arange(pull.shape[0]))
-    least = eigsh(pull, k=1, which="SA", v0=start, tol=0.1, return_eigenvectors=False)
+    least, _ = _symmetric_modes(pull, 1, "SA", 0.1)
     growth = math.sqrt(max(-float(least[0]), 0.0))
     matrices = [m for m in (pull, damping) if m.count_nonzero()]
-    x = np.concatenate([eigsh(m, k=WANTED, which="LA", v0=start, tol=ACCURACY)[1] for m in matrices], axis=1)
+    x = np.concatenate([_symmetric_modes(m, WANTED, "LA", ACCURACY)[1] for m in matrices], axis=1)
     k, d = ((x * (m @ x)).sum(axis=0).astype(complex) for m in (pull, damping))
     root = np.sqrt(0.25 * d * d - k)
     values = np.asarray(np.concatenate([root, -root]) - 0.5 * np.tile(d, 2), np.complex128)
     return Modes(values, np.tile(k, 2), np.tile(d, 2), growth)
+
+
+def _symmetric_modes(matrix: Any, count: int, which: Literal["LA", "SA"], tolerance: float) -> tuple[Array, Array]:
+    """Some eigenvalues and eigenvectors of a symmetric matrix, from a fixed start."""
+    from scipy.sparse.linalg import ArpackNoConvergence, eigsh
+
+    try:
+        values, vectors = eigsh(matrix, k=count, which=which, v0=np.cos(np.arange(matrix.shape[0])), tol=tolerance)
+    except ArpackNoConvergence:
+        raise InvalidInput(NOT_FOUND) from None
+    return values, vectors
 
 
 def _is_symmetric(matrix: Any) -> bool:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.colors import linear
+from pointmass.colors import linear, srgb
 from pointmass.frame import Camera, Drawable, Frame, Points, Segments
 from pointmass.render import fit_camera, image
 from pointmass.solvers.stability import amplification, amplification_of_modes
@@ -220,8 +220,7 @@ def _scale(picture: Picture, draw: Any) -> None:
     left, top, right, bottom = BAR
     share = np.linspace(0.0, max(SHARES), right - left)
     rgb = np.clip(_light(share)[:, :3], 0.0, 1.0)
-    srgb = np.where(rgb <= 0.0031308, 12.92 * rgb, 1.055 * rgb ** (1 / 2.4) - 0.055)
-    picture.paste(Image.fromarray(np.tile((255 * srgb).astype(np.uint8), (bottom - top, 1, 1))), (left, top))
+    picture.paste(Image.fromarray(np.tile((255 * srgb(rgb)).astype(np.uint8), (bottom - top, 1, 1))), (left, top))
     for place in (0.0, 0.5, 1.0, 1.5):
         x = left + place / max(SHARES) * (right - left - 1)
         draw.line((x, bottom, x, bottom + 5), FAINT)

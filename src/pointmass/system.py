@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
@@ -13,9 +14,9 @@ from numpy.typing import NDArray
 
 from pointmass.collisions.collider import Collider
 from pointmass.errors import InvalidInput, about
-from pointmass.laws.elements import ConstraintForce
+from pointmass.laws.elements import ConstraintForce, ElementForce
 from pointmass.laws.force import Blocks, Force, block_matrix
-from pointmass.laws.relaxation import relax
+from pointmass.laws.relaxation import colours, relax
 from pointmass.particles import Array, Particles, Selection
 from pointmass.solvers.base import Solver
 from pointmass.solvers.registry import as_solver
@@ -86,6 +87,7 @@ class ParticleSystem:
         self.filter: Filter | None = None
         self.t = 0.0
         self._islands: tuple[Any, NDArray[np.intp]] | None = None
+        self._colours: tuple[list[Any], dict[Force, NDArray[np.intp]]] | None = None
         self._numbers = np.arange(0)  # 0, 1, 2, ...: the islands where nobody is linked
         for force in self.forces:
             if not isinstance(force, Force):
@@ -189,15 +191,23 @@ class ParticleSystem:
             self._islands = (key, self._components())
         return self._islands[1]
 
-    def jacobian(self, t: Any, y: Array) -> Any:
-        """d(deriv_eval)/dy as a scipy.sparse CSR array of shape (dim, dim), exact, from the traced laws."""
+    def jacobian(self, t: Any, y: Array, share: Array | None = None) -> Any:
+        """d(deriv_eval)/dy as a scipy.sparse CSR array of shape (dim, dim), exact, from the traced laws.
+
+        Parameters
+        ----------
+        share : of what may make the matrix of an implicit step indefinite, that is counted (see `Springs.softened`),
+            shape (dim,); None = all of it, the exact Jacobian.
+        """
         from scipy.sparse import block_array, csr_array, diags_array
 
         p, n = self.particles, len(self.particles)
         x, v = self.split(self._checked(y))
         blocks = Blocks()
         for force in self.forces:
-            if force.enabled:
+            if force.enabled and share is not None and isinstance(force, ElementForce):
+                force.add_jacobian(p, self._particle_time(t), x, v, blocks, share[: 3 * n : 3])
+            elif force.enabled:
                 force.add_jacobian(p, self._particle_time(t), x, v, blocks)
         rows, columns, dx, dv = blocks.entries(n)
         if self.order == 1:
@@ -243,8 +253,20 @@ class ParticleSystem:
         project = None if self.filter is None else self.filter.projection(n).astype(self.particles.dtype)
         length = np.broadcast_to(h, self.dim)[: 3 * n : 3]
         result = rise.reshape(n, 3).copy()
-        relax(elastic, self.particles, self._particle_time(t), length, x.reshape(n, 3), result, sweeps, project)
+        now, orders = self._particle_time(t), [self.colours[force] for force in elastic]
+        relax(elastic, orders, self.particles, now, length, x.reshape(n, 3), result, sweeps, project)
         return result.ravel()
+
+    @property
+    def colours(self) -> dict[Force, NDArray[np.intp]]:
+        """Colours of the elements that `relaxed` goes through: one after the other, and all of one together."""
+        elastic = [force for force in self.forces if isinstance(force, ConstraintForce)]
+        made_of = [self.island_of_particle, *(force.rows(self.particles) for force in elastic)]
+        known = [] if self._colours is None else self._colours[0]
+        if self._colours is None or len(known) != len(made_of) or any(map(operator.is_not, known, made_of)):
+            found = colours(elastic, self.particles, self.island_of_particle)
+            self._colours = made_of, dict(zip(elastic, found, strict=True))
+        return self._colours[1]
 
     # ---------------------------------------------------------------------------------------- what users ask
 
@@ -286,8 +308,7 @@ class ParticleSystem:
         worst = 0.0
         for force in self.forces:
             if isinstance(force, ConstraintForce) and force.nodes == 2 and len(force.ids):
-                everything = np.arange(len(force.ids))
-                rest = np.broadcast_to(force.settings(self.particles, self.t, everything)["rest"][0], everything.shape)
+                rest = force.rests(self.particles, self.t)
                 length = force.values(self.particles, self.particles.x)
                 with np.errstate(over="ignore"):
                     relative = np.abs(length - rest)[rest > 0] / rest[rest > 0]
@@ -314,6 +335,40 @@ class ParticleSystem:
                 raise
         return ids
 
+    def divide(self, row: int, shares: Array) -> NDArray[np.int64]:
+        """Make several particles of one, at its place and as fast; each has a share of its mass.
+
+        They are in the groups where it is, and under the forces that act on it; who is joined to whom is another
+        matter. Momentum and kinetic energy stay the same.
+
+        Parameters
+        ----------
+        shares : one for each, that sum to 1; the first one is that of the particle itself.
+
+        Returns
+        -------
+        NDArray
+            Ids of the new ones, in the order of their shares.
+
+        Raises
+        ------
+        InvalidInput
+            A force has numbers for each particle, which a new one would lack.
+        """
+        p, count = self.particles, len(shares) - 1
+        mass = p.m[row] * np.asarray(shares[1:], p.dtype)
+        columns = {name: np.repeat(column[row], count) for name, column in p.attributes.items()}
+        x, v, lifetime, radius = (np.repeat(a[row : row + 1], count, axis=0) for a in (p.x, p.v, p.lifetime, p.radius))
+        ids = self.add(x, v, m=mass, radius=radius, lifetime=lifetime, **columns)
+        p.m[row] -= mass.sum()
+        p.age[-count:] = p.age[row]
+        for marks in [*p.groups.values(), *(marks for force in self.forces for _, marks in force.marks())]:
+            marks[-count:] = marks[row]
+        if p.pinned[row]:
+            p.pin(np.arange(len(p) - count, len(p)))
+        p.version += 1
+        return ids
+
     def remove(self, which: Selection) -> None:
         """Take particles away, and the springs that end at them."""
         mask = np.ones(len(self.particles), bool)
@@ -328,7 +383,7 @@ class ParticleSystem:
         mask[rows] = True
         result = copy(self)
         result.particles, result.forces = self.particles.part(mask), [force.twin() for force in self.forces]
-        result.filter = result._islands = None
+        result.filter = result._islands = result._colours = None
         for force in result.forces:
             force.keep(self.particles, mask)
         return result

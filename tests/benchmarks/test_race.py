@@ -16,8 +16,9 @@ import pointmass as pm
 from benchmarks import page, race, track
 from benchmarks.probe import Machine, probe
 from benchmarks.toolchain import compiled
-from benchmarks.workloads import emit, free, hair, implicit, pairs, springs
+from benchmarks.workloads import emit, free, hair, implicit, pairs, springs, xpbd
 from benchmarks.workloads.cloth import cloth, irregular
+from benchmarks.workloads.solids import DEEP, Stone
 
 MACHINE = Machine("a machine", 2, 4e9, {"float32": (64e9, 128e9), "float64": (32e9, 64e9)}, (20e9, 40e9))
 
@@ -156,7 +157,9 @@ def test_without_a_compiler_c_is_left_out(monkeypatch: pytest.MonkeyPatch) -> No
 FREE = partial(free.Problem, 300, substeps=32)
 RK4 = partial(free.Problem, 300, solver="rk4", mu=2.0)
 EMIT = partial(emit.Problem, 20_000)
+STONE = partial(emit.Problem, 20_000, collider=Stone(parts=10))
 CLOTH, MESH, HAIR = partial(cloth, 8), partial(irregular, 8), partial(hair.hair, 3)
+TAUT, TAUT_MESH = partial(xpbd.taut, cloth, 17, 5), partial(xpbd.taut, irregular, 8, 1)
 HERE = [
     *((free, FREE, kind) for kind in (free.Pointmass, free.PointmassDiscrete, free.NumPy, free.NumPyBlocks)),
     *((free, FREE, kind) for kind in (free.C, free.CFused)),
@@ -165,7 +168,13 @@ HERE = [
     (springs, HAIR, hair.NumPyStrands),
     *((pairs, partial(pairs.Bodies, 200), kind) for kind in (pairs.Pointmass, pairs.NumPy, pairs.C)),
     *((implicit, partial(implicit.drum, 8), kind) for kind in implicit.CONTESTANTS),
-    *((emit, EMIT, kind) for kind in (emit.Pointmass, emit.PointmassDiscrete, emit.NumPy, emit.NumPyBlocks)),
+    *((xpbd, p, xpbd.NumPy) for p in (TAUT, TAUT_MESH)),
+    (xpbd, TAUT_MESH, xpbd.Pointmass),
+    *(
+        (emit, p, kind)
+        for p in (EMIT, STONE)
+        for kind in (emit.Pointmass, emit.PointmassDiscrete, emit.NumPy, emit.NumPyBlocks)
+    ),
 ]
 
 
@@ -184,6 +193,17 @@ def test_contestants_that_need_no_peer_are_right(workload: ModuleType, make: par
     assert judge.error(result if judge.rows is None else result[judge.rows]) <= judge.most
 
 
+def test_hair_on_a_head_is_judged_by_some_of_its_strands() -> None:
+    head = hair.Head(12, 6, "wavy")
+    contestant = hair.OnAHead(head)
+    contestant.frame()
+    judge = hair.judge_head(head, "")
+    result = np.asarray(contestant.result(), np.float64)
+    assert judge.error(result[judge.rows]) <= judge.most
+    contestant.sim.step()  # one step too many
+    assert judge.error(np.asarray(contestant.result(), np.float64)[judge.rows]) > judge.most
+
+
 def test_the_melt_follows_newtons_law() -> None:
     liquid = pairs.Liquid(3)
     assert len(liquid.x) == 108
@@ -196,6 +216,18 @@ def test_the_melt_follows_newtons_law() -> None:
         pytest.skip(str(reason))
     contestant.frame()
     assert judge.error(np.asarray(contestant.result())) < 1e-10
+
+
+def test_the_lists_of_the_stone_have_the_nearest_triangles() -> None:
+    stone = STONE.keywords["collider"]
+    x = STONE().x.astype(np.float64)
+    gap, normal = stone.distance(x)
+    near = np.isfinite(gap)
+    ours = stone.ours()
+    assert near.sum() > 50
+    np.testing.assert_allclose(gap[near], ours.distance(x[near], 0.0), atol=1e-14)
+    np.testing.assert_allclose(normal[near], ours.normal(x[near], 0.0), atol=1e-12)
+    assert (ours.distance(x[~near], 0.0) > DEEP).all()
 
 
 def test_the_air_of_the_race_of_births_is_that_of_curl_noise() -> None:
@@ -220,8 +252,11 @@ WRONG = [
     (springs, HAIR, {"substeps": 15}),
     (pairs, partial(pairs.Bodies, 200), {"eps": 0.03}),
     (implicit, partial(implicit.drum, 8), {"k_s": 9.9}),
+    (xpbd, TAUT, {"iterations": 6}),
+    (xpbd, TAUT_MESH, {"k_s": 1.0}),
     (emit, EMIT, {"k": 3.9}),
     (emit, EMIT, {"restitution": 0.45}),
+    (emit, STONE, {"restitution": 0.45}),
     (emit, EMIT, {"seed": 4}),
     (emit, EMIT, {"speed": 1.45}),
 ]
@@ -234,9 +269,7 @@ def test_a_wrong_contestant_is_caught(workload: ModuleType, make: partial, chang
 
     problem = make()
     judge = workload.judge(problem, "")
-    kind = {emit: emit.NumPy, free: free.NumPy, springs: springs.NumPy, pairs: pairs.NumPy, implicit: implicit.SciPy}[
-        workload
-    ]
+    kind = implicit.SciPy if workload is implicit else workload.NumPy
     contestant = kind(replace(problem, **change))
     contestant.frame()
     result = np.asarray(contestant.result(), np.float64)

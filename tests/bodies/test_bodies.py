@@ -19,10 +19,14 @@ EXAMPLES = {
     "scatter": {"count": 12, "radius": 0.1, "radius_range": 0.05, "speed": 2.0},
     "chain": {"links": 7, "length": 2.0, "mass": 3.0},
     "lattice": {"counts": (3, 4, 5), "mass": 2.0},
+    "jelly": {"counts": (3, 4, 5), "size": (0.2, 0.3, 0.4), "tilt": 20.0, "pinned": "bottom"},
     "net": {"rows": 3, "cols": 4, "size": (1.0, 2.0), "links": 2, "pinned": "top edge"},
     "cloth_from_mesh": {"mesh": TETRAHEDRON, "pinned": "top"},
     "cloth": {"rows": 4, "cols": 5, "size": (1.0, 2.0), "pinned": "top corners"},
     "hair": {"strands": 5, "points": 24, "style": "curly", "jitter": 0.05},
+    "snake": {"segments": 5, "amplitude": 0.0},
+    "worm": {"segments": 5, "amplitude": 0.0},
+    "fish": {"count": 2, "places": [[0, 0, 0], [0, 1, 0]], "upright": 0.0},
 }
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pointmass as pm
-from pointmass.meshes import read_mesh, triangle_mesh
+from pointmass.meshes import TriangleMesh, read_mesh, triangle_mesh
 from tests.shapes import TETRAHEDRON
 
 SQUARE = ([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
@@ -95,6 +95,21 @@ def test_a_file_keeps_its_pattern_and_loses_what_is_no_surface(tmp_path) -> None
     assert read_mesh(tmp_path / "rag.obj").uv is not None
     scene = pm.Scene(bodies=[body])
     assert pm.Scene.from_toml(scene.to_toml()) == scene
+
+
+def test_a_mesh_in_memory_keeps_its_pattern_as_text(tmp_path) -> None:
+    """Also where a vertex has several places on it."""
+    (tmp_path / "rag.obj").write_text(OBJ)
+    mesh = read_mesh(tmp_path / "rag.obj")
+    mesh = TriangleMesh(mesh.vertices, mesh.faces, mesh.uv + np.array([0.0, 0.25])[:, None, None])
+    scene = pm.Scene(bodies=[pm.cloth_from_mesh(mesh)])
+    again = pm.Scene.from_toml(scene.to_toml())
+    assert again == scene
+    np.testing.assert_array_equal(again.bodies[0].particles.surfaces["cloth"].uv, mesh.uv)
+    flat = pm.cloth_from_mesh((mesh.vertices, mesh.faces, mesh.vertices[:, :2])).particles.surfaces["cloth"]
+    np.testing.assert_array_equal(flat.uv, mesh.vertices[mesh.faces][:, :, :2])
+    with pytest.raises(pm.InvalidInput, match="uv of a mesh"):
+        pm.cloth_from_mesh((mesh.vertices, mesh.faces, [[0, 0]]))
 
 
 def test_duplicate_vertices_are_one() -> None:

@@ -44,12 +44,21 @@ def test_a_rope_hangs_by_its_weight() -> None:
     assert built.particles.x[0, 1] - lower[:, 1] == pytest.approx([down, down], rel=0.02)  # they are pulled inwards
 
 
+def test_slack_makes_ropes_longer_and_as_much_heavier() -> None:
+    taut, slack = (pm.net(3, 3, links=2, mass=0.1, stiffness=20.0, slack=s) for s in (0.0, 0.25))
+    np.testing.assert_array_equal(taut.particles.x, slack.particles.x)
+    np.testing.assert_allclose(slack.forces[0].arguments["rest"], 1.25 * taut.forces[0].arguments["rest"])
+    np.testing.assert_allclose(slack.particles.m, 1.25 * taut.particles.m)
+    np.testing.assert_allclose(slack.forces[0].arguments["k_s"] * slack.forces[0].arguments["rest"], 20.0)
+
+
 @pytest.mark.parametrize(
     ("build", "sentence"),
     [
         (lambda: pm.net(1, 3), "rows = 1"),
         (lambda: pm.net(links=0), "links = 0"),
         (lambda: pm.net(mass=0), "mass = 0"),
+        (lambda: pm.net(slack=-0.1), "slack = -0.1"),
         (lambda: pm.net(stiffness=-1), "stiffness = -1"),
         (lambda: pm.net(pinned="knots"), "unknown value of pinned 'knots'"),
     ],

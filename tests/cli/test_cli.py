@@ -96,7 +96,7 @@ def test_help_and_version() -> None:
     assert pm.__version__ in pointmass("--version").stdout
     for arguments in ([], ["-h"], ["--help"]):
         assert "SCENE is the name of a scene" in pointmass(*arguments).stdout
-    for command in ("list", "run", "render", "check", "export", "new"):
+    for command in ("list", "run", "render", "view", "check", "export", "new"):
         assert "-h, --help" in pointmass(command, "-h").stdout
 
 
@@ -228,11 +228,22 @@ def test_export_writes_arrays(folder: Path) -> None:
         assert data["positions"].tobytes() == np.stack([f.positions for f in Cache.open("a.zarr")]).tobytes()
 
 
+def test_export_writes_the_surfaces_of_a_frame(folder: Path) -> None:
+    (folder / "sheet.toml").write_text('frames = 3\n[[bodies]]\ntype = "cloth"\nrows = 3\ncols = 3\n')
+    pointmass("run", "sheet.toml")
+    assert pointmass("export", "sheet.zarr", "-o", "s.ply", "--frame", "0").exit_code == 0
+    assert (folder / "s.ply").read_bytes().startswith(b"ply")
+    assert pointmass("export", "sheet.zarr", "-o", "s_%02d.obj").exit_code == 0
+    assert sorted(p.name for p in folder.glob("s_*.obj")) == ["s_00.obj", "s_01.obj", "s_02.obj"]
+    late = pointmass("export", "sheet.zarr", "-o", "s.glb", "--frame", "3")
+    assert "--frame 3 is not allowed: the cache has the frames 0 to 2" in late.stderr
+
+
 def test_check_says_what_is_safe(folder: Path) -> None:
     result = json.loads(pointmass("check", "pendulum", "--json").stdout)
     assert set(result) == {
         "scene", "solver", "dt", "largest_safe_dt", "recommended_dt", "recommended_substeps",
-        "frequency", "damping_ratio", "period", "safe",
+        "frequency", "damping_ratio", "period", "safe", "solver_reason",
         "particles", "springs", "forces", "emitters", "families", "carriers", "warning",
     }  # fmt: skip
     assert result["safe"] is True

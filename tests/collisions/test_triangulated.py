@@ -76,8 +76,9 @@ def test_who_is_near_is_never_called_far():
         cubes = shape.voxels
         at = np.floor((x - cubes.origin) / cubes.size).astype(int)
         within = ((at >= 0) & (at < cubes.counts)).all(axis=1)
-        bound = cubes.bounds.reshape(cubes.counts)[tuple(at[within].T)]
-        assert (bound <= shape.distance(x[within], 0.0)).all()
+        away = np.linalg.norm(x - cubes.origin - cubes.size * (at + 0.5), axis=1)[within]
+        bound = cubes.bounds.reshape(cubes.counts)[tuple(at[within].T)] - away
+        assert (bound <= shape.distance(x[within], 0.0) + 1e-12).all()
         assert (bound > 0).any()
 
 

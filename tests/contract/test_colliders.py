@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import pointmass as pm
 from pointmass.solvers import SOLVERS
+from tests.covering import covering
 from tests.shapes import SHEET, TETRAHEDRON
 
 X, Z = np.meshgrid(np.linspace(-2.2, 2.2, 10), np.linspace(-2.2, 2.2, 9), indexing="ij")
@@ -225,8 +226,9 @@ def test_a_room_has_walls_of_its_own_material(collider):
     assert all(surface.material == arguments for surface in (made, *made.surfaces))
 
 
-@colliders
-@pytest.mark.parametrize("name", ["symplectic_euler", "rk4", "dopri5", "implicit_euler"])
+@pytest.mark.parametrize(
+    ("collider", "name"), covering(4, ALL, ["symplectic_euler", "rk4", "dopri5", "implicit_euler"])
+)
 def test_the_same_bits_twice(collider, name):
     states = []
     for _ in range(2):

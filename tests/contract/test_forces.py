@@ -34,6 +34,7 @@ FOURS = [(0, 1, 2, 3), (5, 2, 4, 0)]
 RNG = np.random.default_rng(42)
 CELLS = RNG.standard_normal((2, 3, 4, 1, 3))
 CELL_PLACE = {"origin": (-2.0, -3.0, 0.0), "spacing": 1.7, "times": (0.0, 1.0)}
+WAVE = 0.25 * math.sin(2 * math.pi * TIME + 0.4)
 CHANCE = [naive.hashed(i ^ naive.hashed(0)) // 256 / 2**24 for i in range(N)]
 CHARGE, CIRCULATION = RNG.uniform(-1, 1, N), RNG.uniform(-2, 2, N)
 
@@ -48,6 +49,7 @@ class Example:
     energy: Callable[..., Any] | None = None
     elements: list[tuple[int, ...]] | None = None
     pairs: bool = False
+    crowd: bool = False  # a law of one among all others
     singular: bool = False  # not finite where particles meet, as its docstring says
     text: bool = True  # its arguments can stand in a scene file
     rough: bool = False  # the plain version tries many places, and not the nearest itself
@@ -101,6 +103,34 @@ EXAMPLES: dict[str, list[Example]] = {
             naive.spring_energy,
             elements=PAIRS,
         ),
+    ],
+    "muscles": [
+        Example(
+            {"pairs": PAIRS, "k_s": 3.0, "rest": 0.8, "offset": [0.1, 0.0, -0.2, 0.3], "amplitude": 0.25, "phase": 0.4},
+            lambda e: {"k_s": 3.0, "k_d": 0.0, "rest": 0.8 * (1 + (0.1, 0.0, -0.2, 0.3)[e] + WAVE)},
+            naive.spring,
+            naive.spring_energy,
+            elements=PAIRS,
+        )
+    ],
+    "scales": [
+        Example(
+            {"links": PAIRS, "level": 0.2, "k_s": [3.0, 4.0, 5.0, 6.0], "damping": 0.3, "backward": 0.9, "creep": 0.1},
+            lambda e: {
+                **{"level": 0.2, "k_s": 3.0 + e, "damping": 0.3, "creep": 0.1},
+                **{"forward": 0.1, "backward": 0.9, "sideways": 0.4},
+            },
+            naive.scales,
+            elements=PAIRS,
+        )
+    ],
+    "slender_drag": [
+        Example(
+            {"links": PAIRS, "along": 0.3, "across": "0.5 + t"},
+            lambda e: {"along": 0.3, "across": 0.5 + TIME},
+            naive.slender_drag,
+            elements=PAIRS,
+        )
     ],
     "angles": [
         Example(
@@ -165,6 +195,35 @@ EXAMPLES: dict[str, list[Example]] = {
             elements=JOINTS,
             text=False,
         ),
+    ],
+    "water": [
+        Example(
+            {"triangles": JOINTS, "drag": [2.0, 3.0], "velocity": (0.3, "t", -0.2)},
+            lambda e: {"flow": lambda x: (0.3, TIME, -0.2), "drag": (2.0, 3.0)[e]},
+            naive.water,
+            elements=JOINTS,
+        ),
+        Example(
+            {"triangles": JOINTS}, lambda e: {"flow": lambda x: (0, 0, 0), "drag": 1000.0}, naive.water, elements=JOINTS
+        ),
+    ],
+    "fins": [
+        Example(
+            {
+                "sections": FOURS,
+                "angle": [1.0, 2.5],
+                "area": 0.4,
+                "drag": 3.0,
+                "upright": 0.2,
+                "velocity": (0.3, "t", 0.1),
+            },
+            lambda e: {
+                "flow": lambda x: (0.3, TIME, 0.1),
+                **{"angle": (1.0, 2.5)[e], "area": 0.4, "drag": 3.0, "upright": 0.2},
+            },
+            naive.fins,
+            elements=FOURS,
+        )
     ],
     "line_attractor": [
         Example(
@@ -241,6 +300,87 @@ EXAMPLES: dict[str, list[Example]] = {
             naive.cushion_energy,
             text=False,
         )
+    ],
+    "flocking": [
+        Example(
+            {"cutoff": 3.0, "field_of_view": 360.0, "separation": 2.0, "alignment": "1 + t"},
+            lambda i: {
+                **{"cutoff": 3.0, "near": 1.0, "separation": 2.0, "alignment": 1 + TIME, "cohesion": 1.0},
+                "view": 360.0,
+            },
+            naive.flocking,
+            crowd=True,
+        ),
+        Example(
+            {"cutoff": 2.5, "separation_radius": 2.2, "separation": 9.0, "field_of_view": "200 + 10*t", "limit": 3.0},
+            lambda i: {
+                **{"cutoff": 2.5, "near": 2.2, "separation": 9.0, "alignment": 1.0, "cohesion": 1.0},
+                **{"view": 200 + 10 * TIME, "limit": 3.0},
+            },
+            naive.flocking,
+            crowd=True,
+        ),
+    ],
+    "flee": [
+        Example(
+            {"by": [0, 3, 4], "strength": "1 + t", "cutoff": 4.0},
+            lambda i: {"by": (0, 3, 4), "strength": 1 + TIME, "cutoff": 4.0, "view": 360.0},
+            naive.flee,
+            crowd=True,
+        ),
+        Example(
+            {"by": [0, 1, 2, 3], "strength": -3.0, "cutoff": 3.0, "field_of_view": 190.0},
+            lambda i: {"by": (0, 1, 2, 3), "strength": -3.0, "cutoff": 3.0, "view": 190.0},
+            naive.flee,
+            crowd=True,
+        ),
+    ],
+    "seek": [
+        Example(
+            {"target": (0.1, "2*t", 0), "speed": 2.0, "rate": "1 + t", "arrival": 1.5},
+            lambda i: {
+                **{"target": (0.1, 2 * TIME, 0), "speed": 2.0, "rate": 1 + TIME, "arrival": 1.5, "limit": math.inf}
+            },
+            naive.seek,
+        ),
+        Example(
+            {"speed": "abs(charge)", "arrival": 0.1, "limit": 0.8},
+            lambda i: {
+                **{"target": (0, 0, 0), "speed": abs(CHARGE[i]), "rate": 1.0, "arrival": 0.1, "limit": 0.8},
+            },
+            naive.seek,
+        ),
+    ],
+    "avoid": [
+        Example(
+            {
+                "around": [Sphere((0.2, 0, 0), 0.5), Plane(("0.1*t", -1, 0)), Sphere(radius=3.0, inside=True)],
+                "strength": 3.0,
+                "distance": "0.5 + t",
+                "horizon": 0.4,
+            },
+            lambda i: {
+                "solids": lambda x: [
+                    (
+                        naive.norm(naive.sub(x, (0.2, 0, 0))) - 0.5,
+                        naive.scale(1 / naive.norm(naive.sub(x, (0.2, 0, 0))), naive.sub(x, (0.2, 0, 0))),
+                    ),
+                    (x[1] + 1, (0, 1, 0)),
+                    (3 - naive.norm(x), naive.scale(-1 / naive.norm(x), x)),
+                ],
+                **{"strength": 3.0, "distance": 0.5 + TIME, "horizon": 0.4},
+            },
+            naive.avoid,
+            text=False,
+        )
+    ],
+    "cruise": [
+        Example(
+            {"speed": "1 + t", "rate": 0.7},
+            lambda i: {"speed": 1 + TIME, "rate": 0.7, "limit": math.inf},
+            naive.cruise,
+        ),
+        Example({"speed": 3.0, "limit": 1.5}, lambda i: {"speed": 3.0, "rate": 1.0, "limit": 1.5}, naive.cruise),
     ],
     "harmonic": [
         Example(
@@ -492,7 +632,8 @@ def expected(example: Example, p: Particles) -> Any:
     state = SimpleNamespace(x=p.x.tolist(), v=p.v.tolist(), m=p.m.tolist(), t=TIME)
     if example.elements is not None:
         return np.array(naive.over_elements(example.law, example.elements, state, example.numbers))
-    return np.array((naive.over_pairs if example.pairs else naive.over_particles)(example.law, state, example.numbers))
+    loop = naive.over_pairs if example.pairs else naive.over_crowd if example.crowd else naive.over_particles
+    return np.array(loop(example.law, state, example.numbers))
 
 
 def expected_energy(example: Example, p: Particles) -> float:
@@ -551,7 +692,7 @@ def test_force_is_minus_the_gradient_of_its_energy(name, example):
 
 
 @every
-def test_jacobian_equals_finite_differences(name, example):
+def test_F04_jacobian_equals_finite_differences(name, example):
     p = particles()
     force = make(name, example)
     force.bind(p)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,12 +12,18 @@ from pointmass.frame import Frame
 from pointmass.scene import Scene
 from pointmass.scenes import SCENES, CheckFailed
 from pointmass.scenes.base import ShippedScene
+from pointmass.scenes.curtain import HOOK, Curtain
+from pointmass.simulation import Simulation
+from pointmass.solvers import ImplicitEuler
 from tests.small import SMALL
 
 VARIANTS = [(name, SMALL.get(name, {})) for name in SCENES] + [
     ("orbit", {"kind": "kepler"}),
     ("flow", {"particles": 200, "sway": 0.0, "arrows": 0, "streamlines": 0}),
+    ("field", {"drop": "cloth", "arrows": 6, "streamlines": 6}),
+    ("field", {"drop": "hair", "arrows": 6, "streamlines": 6}),
 ]
+FRAMES = {"field": 60, "drape": 90, "hair": 120, "jelly": 90, "net": 60, "fish": 60, "school": 60}  # 150 show no more
 
 
 def frames_of(scene: Scene, count: int) -> list[Frame]:
@@ -34,12 +42,50 @@ def made(name: str, settings: dict[str, object]) -> ShippedScene:
 def test_scene_passes_its_check_and_repeats_its_bits(name: str, settings: dict[str, object]) -> None:
     shipped = made(name, settings)
     scene = shipped.build()
-    count = min(scene.frames, 150)
+    count = min(scene.frames, FRAMES.get(name, 150))
     first = frames_of(scene, count)
     shipped.check(first)
     assert all(np.isfinite(f.positions).all() and np.isfinite(f.velocities).all() for f in first)
     again = frames_of(Scene.from_toml(scene.to_toml()), 30)
     assert bits(again) == bits(first[:30])
+
+
+FEW: dict[str, dict[str, object]] = {  # of scenes with a cloth that are made for implicit steps
+    "cloth": {"particles": 8},
+    "flag": {"particles": 8},
+    "drape": {"particles": 8},
+    "curtain": {"particles": 9, "rings": 3},
+    "tear": {"particles": 8},
+}
+SHEETS = [(n, p) for n in FEW for p in (None, *SCENES[n].presets)]
+
+
+def in_implicit_steps(scene: Scene) -> Simulation:
+    """The scene, with whatever leads, tears or meets its cloth, in steps of backward Euler of 1/60 s."""
+    return replace(scene, solver=ImplicitEuler(tolerance=1e-3), dt=1 / 60).simulation()
+
+
+@pytest.mark.parametrize(("name", "preset"), SHEETS)
+def test_cloth_takes_implicit_steps_of_a_sixtieth(name: str, preset: str | None) -> None:
+    shipped = SCENES[name].with_settings(FEW[name], preset)
+    scene = shipped.build()
+    simulation = in_implicit_steps(scene)
+    shipped.check(list(simulation.frames(20, 60.0)))
+    assert simulation.engine.stats.rejected < 20
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("small", [True, False], ids=["small", "normal"])
+@pytest.mark.parametrize(("name", "preset"), SHEETS)
+def test_cloth_takes_implicit_steps_of_a_sixtieth_at_full_length(
+    name: str, preset: str | None, small: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("POINTMASS_ENGINE", "compiled")
+    shipped = SCENES[name].with_settings(SMALL[name] if small else {}, preset)
+    scene = shipped.build()
+    simulation = in_implicit_steps(scene)
+    shipped.check(list(simulation.frames(scene.frames, scene.fps)))
+    assert simulation.engine.stats.rejected < 0.1 * simulation.steps
 
 
 @pytest.mark.full
@@ -60,6 +106,14 @@ def test_a_preset_passes_the_check(name: str, preset: str) -> None:
     assert SCENES[name].with_settings({}, preset) != made(name, {})
 
 
+@pytest.mark.full
+@pytest.mark.parametrize(("name", "preset"), PRESETS)
+def test_a_preset_passes_the_check_at_full_length(name: str, preset: str) -> None:
+    shipped = SCENES[name].with_settings({}, preset)
+    scene = shipped.build()
+    shipped.check(frames_of(scene, scene.frames))
+
+
 def test_every_scene_has_presets() -> None:
     assert all(len(shipped.presets) >= 3 for shipped in SCENES.values())
     with pytest.raises(InvalidInput, match=r"unknown preset of scene fountain: 'geysir': did you mean 'geyser'"):
@@ -71,15 +125,22 @@ def test_every_scene_has_presets() -> None:
 
 QUICK = {
     "flow": {"particles": 20, "arrows": 0, "streamlines": 0},
+    "field": {"particles": 20, "arrows": 0, "streamlines": 0},
     "springs": {"side": 3},
     "bounce": {"balls": 10},
-    **{name: SMALL[name] for name in ("fireworks", "snow", "smoke", "dust")},
-    **{name: {"particles": 10} for name in ("cloth", "flag", "drape")},
+    **{name: SMALL[name] for name in ("fireworks", "snow", "smoke", "dust", "flock")},
+    **{name: {"particles": 10} for name in ("cloth", "flag", "drape", "tear")},
+    "curtain": {"particles": 9, "rings": 3},
+    "net": {"balls": 2, "size": 1.0, "mesh": 0.8},
+    "jelly": {"particles": 4, "jellies": 2},
     "hair": {"strands": 8, "points": 12, "style": "straight", "children": 0},
+    "heap": {"cloths": 2, "particles": 10},
+    "school": {"fish": 8},
 }
 COSTLY = {  # only so many steps
     *("balls", "rate", "links", "side", "particles", "mass", "stiffness", "steps_per_second"),
     *("launches", "stars", "tail", "smoke", "sand", "dust", "stretch", "bend", "strands", "points", "children"),
+    *("animals", "fish", "predators"),
 }
 ENDS = [
     (name, parameter["name"], value)
@@ -107,10 +168,55 @@ def at_end(name: str, parameter: str, value: object, frames: int) -> None:
         ("springs", "size", 100),
         ("springs", "damping_ratio", 5),
         ("springs", "drag", 10),
+        ("jelly", "gravity", 0),  # no energy to compare with
     ],
 )
 def test_the_ends_of_a_range_that_were_hard(name: str, parameter: str, value: object) -> None:
     at_end(name, parameter, value, 8)
+
+
+def test_hair_with_links_that_would_lead_through_the_head_is_refused() -> None:
+    with pytest.raises(InvalidInput, match=r"points = 10 is not allowed: .* give at least 11 points"):
+        made("hair", {"points": 10, "length": 0.5})
+    at_end("hair", "points", 6, 16)
+
+
+def test_a_jelly_too_soft_for_its_weight_is_refused() -> None:
+    with pytest.raises(InvalidInput, match=r"stiffness = 6000 is not allowed: .* give at least 9810 Pa"):
+        made("jelly", {"stiffness": 6e3, "size": 0.5})
+    assert made("jelly", {"stiffness": 9810, "size": 0.5})
+
+
+def test_a_curtain_too_soft_to_hang_at_its_rings_is_refused() -> None:
+    large: dict[str, object] = {"width": 10, "height": 8, "material": "leather"}
+    with pytest.raises(InvalidInput, match=r"stretch = 200 is not allowed: .* give at least 1047 N/m"):
+        made("curtain", large)
+    assert made("curtain", {**large, "stretch": 1047})
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"width": 10, "height": 8, "material": "leather", "stretch": 840},
+        {"width": 10, "height": 8, "material": "leather", "stretch": 2600, "gravity": 30},
+        {"width": 3, "height": 8, "material": "denim", "stretch": 420},
+    ],
+)
+def test_a_curtain_just_stiff_enough_is_not_torn_out_of_shape(settings: dict[str, object]) -> None:
+    curtain = made("curtain", {"particles": 9, "rings": 3, "wind": 0.0, "time": 60.0, **settings})
+    with pytest.raises(InvalidInput, match="stretch"):
+        replace(curtain, stretch=0.9 * curtain.stretch)
+    curtain.check(frames_of(curtain.build(), 100))
+
+
+@pytest.mark.parametrize("settings", [{}, {"material": "leather", "rings": 3}, {"width": 10}, {"stretch": 50.0}])
+def test_hooks_of_a_curtain_bear_it_whatever_its_cloth(settings: dict[str, object]) -> None:
+    curtain = Curtain.with_settings({"particles": 9, "wind": 0.0, "time": 60.0, **settings})
+    sheet, hooks = curtain.bodies()[0], curtain.hooks()
+    k = hooks.settings(sheet.particles, 0.0, np.arange(len(hooks.ids)))["k_s"][0]
+    longer = 9.81 * sheet.particles.m.sum() / (curtain.rings - 1) / k
+    assert np.all((longer > 0.2 * HOOK) & (longer <= 0.25 * HOOK))
 
 
 @pytest.mark.full

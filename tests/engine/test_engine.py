@@ -15,6 +15,7 @@ from pointmass.engine import store
 from pointmass.engine.engine import Engine
 from pointmass.engine.forces import tiled
 from pointmass.engine.island import Span
+from pointmass.engine.kernels import grow_old
 from pointmass.engine.reference import ReferenceEngine
 from pointmass.forces import FORCES
 from pointmass.solvers import SOLVERS
@@ -68,7 +69,12 @@ LAWS: dict[str, list[Callable[[], pm.Force]]] = {
     "springs": [
         lambda: pm.Springs([(0, 1), (1, 2), (5, 2), (6, 7)], 20.0, [0.5, 0.1, 0.2, 0.3], rest="1 + 0.2*sin(9*t)")
     ],
+    "muscles": [lambda: pm.Muscles([(0, 1), (1, 2), (6, 7)], 20.0, 0.1, amplitude=0.2, phase=[0.0, 1.0, 2.0])],
+    "scales": [lambda: pm.Scales([(0, 1), (1, 2), (6, 7)], 0.3, [20.0, 5.0, 9.0], creep=0.1)],
+    "slender_drag": [lambda: pm.SlenderDrag([(0, 1), (1, 2), (6, 7)], 0.3, [0.5, 0.6, 0.7])],
     "plate_wind": [lambda: pm.PlateWind([(0, 1, 2), (2, 5, 6)], [pm.Vortex(2.0, eps=0.2), (1, "t", 0)])],
+    "water": [lambda: pm.Water([(0, 1, 2), (2, 5, 6)], 2.0, [pm.Vortex(2.0, eps=0.2), (1, "t", 0)])],
+    "fins": [lambda: pm.Fins([(0, 1, 2, 3), (2, 5, 6, 4)], [1.0, 2.5], 0.4, 2.0, 0.1, (1, "t", 0))],
     "angles": [lambda: pm.Angles([(0, 1, 2), (2, 5, 1)], 2.0, 0.1, rest=0.5)],
     "hinges": [lambda: pm.Hinges([(0, 1, 2, 3), (2, 5, 1, 4)], 2.0, 0.1)],
     "volumes": [lambda: pm.Volumes([(0, 1, 2, 3), (2, 5, 1, 6)], 2.0, 0.1, rest=0.5)],
@@ -88,9 +94,21 @@ LAWS: dict[str, list[Callable[[], pm.Force]]] = {
     "gravitation": [lambda: pm.Gravitation(0.5, eps=0.4), lambda: pm.Gravitation("1 + t", eps=0.4, on=[1, 2, 6])],
     "lennard_jones": [lambda: pm.LennardJones(0.1, 0.3)],
     "soft_sphere": [lambda: pm.SoftSphere(50.0, 0.3, radius=0.4)],
+    "flocking": [lambda: pm.Flocking(1.5, 0.6, "2 + t", 1.0, 0.5, 200.0, 3.0)],
+    "flee": [lambda: pm.Flee([0, 1, 5], 4.0, 1.5, 300.0)],
+    "seek": [lambda: pm.Seek(("t", 1, 0), 2.0, 1.5, 0.5, limit=1.0)],
+    "avoid": [lambda: pm.Avoid([pm.Sphere(("t", 0, 0), radius=0.3), pm.Plane((0, -2, 0))], 4.0)],
+    "cruise": [lambda: pm.Cruise(1.5, 2.0, limit="1 + charge")],
     "point_vortices": [lambda: pm.PointVortices("charge", eps=0.3)],
 }
-SUMMED_APART = ("gravitation", "lennard_jones", "soft_sphere", "point_vortices")  # in blocks, not one by one
+SUMMED_APART = (
+    "gravitation",
+    "lennard_jones",
+    "soft_sphere",
+    "point_vortices",
+    "flocking",
+    "flee",
+)  # in blocks, not one by one
 NOISY = ("curl_noise", "gust", "flutter", "diffusion")  # long programs: their kernels are slow in plain Python
 SOLVERS_OF = {
     name: [kind()] + ([kind(adaptive=False)] if name in ("bs32", "dopri5") else []) for name, kind in SOLVERS.items()
@@ -317,6 +335,17 @@ def test_age_is_the_same_in_spans() -> None:
     np.testing.assert_array_equal(one.system.particles.age, many.system.particles.age)
 
 
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_ages_grow_as_step_by_step(dtype: Any) -> None:
+    for start in (np.full(5000, 0.3), np.random.default_rng(1).uniform(0, 1, 5000), np.repeat([0.1, 0.2], 2500)):
+        age, lived = start.astype(dtype), np.random.default_rng(2).uniform(0, 0.1, 37).astype(dtype)
+        wanted = age.copy()
+        for more in lived:
+            wanted += more
+        grow_old(age, lived)
+        np.testing.assert_array_equal(age, wanted)
+
+
 def test_laws_that_read_the_age() -> None:
     slow, fast = (
         pm.Simulation(system(lambda: pm.Drag("0.1 + age")), pm.RK4(), DT, compiled=compiled)
@@ -369,6 +398,24 @@ def test_lanes_of_single_particles_are_vectors() -> None:
     for name in ("lanes4", "lanes1", "load", "keep"):
         text = "".join(scope[name].inspect_asm().values())
         assert text.count("%ymm") + text.count("%zmm") > 50, name
+
+
+def test_those_who_dip_into_a_surface_between_two_looks_are_seen() -> None:
+    def made(*floor: pm.Collider) -> pm.ParticleSystem:
+        rng = np.random.default_rng(5)
+        g, lowest = 1000.0, rng.uniform(0, 4 * DT, 400)  # when they are lowest, and how low they come
+        x, v = rng.uniform(-1, 1, (400, 3)), np.zeros((400, 3))
+        v[:, 1] = -g * lowest
+        x[:, 1] = g * lowest**2 / 2 + rng.uniform(-0.2, 0.2, 400)
+        x[:, 1] = np.maximum(x[:, 1], 0.01)
+        return pm.ParticleSystem(pm.Particles(x, v), [pm.Gravity((0, g, 0))], floor)
+
+    one, two = both(lambda: made(pm.Plane(restitution=0.5)), pm.Leapfrog(), 4)
+    same(one, two)
+    free = pm.Simulation(made(), pm.Leapfrog(), DT, compiled=False)
+    free.step(4)
+    dipped = (free.system.particles.x != two.particles.x).any(axis=1)
+    assert 40 < (dipped & (free.system.particles.x[:, 1] > 0.1)).sum() < 360
 
 
 def test_the_last_of_several_steps_can_be_looked_into_afterwards() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -256,6 +257,49 @@ def test_the_warm_start_saves_iterations_and_is_cleared_on_the_grid() -> None:
     assert iterations(COLD + 1, True)[1] != iterations(COLD + 1, False)[1]
 
 
+def crumpled() -> pm.ParticleSystem:
+    """A stiff net that is squeezed and folded: the matrix of a step is anything but positive definite."""
+    system = net()
+    p = system.particles
+    p.x[:] = p.x * (0.6, 1.0, 0.6) + np.random.default_rng(4).normal(0, 0.02, p.x.shape)
+    system.forces[2].set(k_s=500.0)
+    return system
+
+
+def test_folded_cloth_is_solved_with_less_of_what_pushes() -> None:
+    """Also where several solutions are near: both paths end in some that solve the equations."""
+    ours, theirs = crumpled(), crumpled()
+    solver = pm.ImplicitEuler("cg", tolerance=1e-12, cg_tolerance=1e-6)
+    before = ours.energy().total
+    outcome, _ = advanced(ours, solver, 2)
+    engine = reference(theirs, solver, 2)
+    assert outcome.good
+    assert outcome.stats.rejected == engine.stats.rejected == 0
+    assert ours.energy().total < before
+    np.testing.assert_allclose(ours.get_state(), theirs.get_state(), rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_step_that_is_not_solved_is_divided(solver: Any) -> None:
+    """On both paths into the same parts; particles alone, which are solved, keep their whole step to the bit."""
+    ours, theirs, exact = chains(), chains(), chains()
+    hasty = solver(max_iterations=4)
+    for system in (ours, theirs, exact):
+        system.particles.v[1:4] = (0.0, 40.0, 0.0), (0.0, -30.0, 5.0), (0.0, 0.0, 60.0)
+        system.forces[1].set(k_s=5e4)
+    outcome, memory = advanced(ours, hasty, 2)
+    engine = reference(theirs, hasty, 2)
+    reference(exact, solver(), 2)
+    assert outcome.good
+    assert outcome.stats.rejected == engine.stats.rejected > 0
+    assert outcome.stats.iterations == engine.stats.iterations
+    a, b, c = ours.get_state(), theirs.get_state(), exact.get_state()
+    np.testing.assert_allclose(a, b, rtol=0, atol=1e-8 * np.abs(b).max())
+    alone = np.r_[12:15, 24:27, 39:42, 51:54]
+    assert a[alone].tobytes() == b[alone].tobytes() == c[alone].tobytes()
+    np.testing.assert_allclose(memory["rise"], engine.memory["rise"], rtol=0, atol=1e-6 * np.abs(b).max())
+
+
 def test_pairs_that_know_where_they_are_have_blocks_of_their_own() -> None:
     forces = {type(f).__name__: f for f in chains().forces}
     assert is_relative(forces["Springs"])
@@ -320,3 +364,21 @@ def test_what_stands_on_the_ground_stays_there() -> None:
     np.testing.assert_allclose(a.v, b.v, rtol=0, atol=1e-11)
     assert a.x[:2].tobytes() == b.x[:2].tobytes()
     assert a.v[:2].tobytes() == b.v[:2].tobytes()
+
+
+@pytest.mark.parametrize("count", [13, 12], ids=["chain", "ring"])
+def test_a_dozen_families_on_a_floor(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three jellies have as many, and some of their numbers once had the names of entries of matrices."""
+    monkeypatch.setattr(store, "load", lambda *text: SimpleNamespace(**store.plain(*text)))
+
+    def run(compiled: bool) -> pm.Particles:
+        rng = np.random.default_rng(0)
+        p = pm.Particles(np.abs(rng.normal(size=(count, 3))))
+        families = [pm.Springs([(k, (k + 1) % count)], k_s=50.0 + k, k_d=0.5) for k in range(12)]
+        system = pm.ParticleSystem(p, [pm.Gravity(), *families], [pm.Plane(friction=0.4, restitution=0.0)])
+        pm.Simulation(system, pm.ImplicitEuler(**SHARP), DT, compiled=compiled).step(12)
+        return p
+
+    slow, fast = run(False), run(True)
+    np.testing.assert_allclose(fast.x, slow.x, atol=1e-9)
+    np.testing.assert_allclose(fast.v, slow.v, atol=1e-8)

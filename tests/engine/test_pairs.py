@@ -62,6 +62,11 @@ CASES = {
     "lennard_jones": lambda: pm.LennardJones(sigma=0.2),
     "soft_sphere": lambda: pm.SoftSphere(k_d=2.0),
     "points": lambda: pm.SoftSphere(radius=0.0),
+    "one way": lambda: drawn_along(on=slice(0, 12), by=slice(8, None, 2)),
+    "by all": lambda: drawn_along(on=[3, 5, 6], by=slice(None)),
+    "one way within a cut-off": lambda: fluid(on=slice(0, 12), by=slice(8, None, 2)),
+    "one way in a box": lambda: coulomb(cutoff=0.5, box=(1.0, 1.3, 1.7), on=slice(6, None), by=[2, 3, 11]),
+    "by nobody": lambda: fluid(by=[]),
 }
 
 
@@ -161,7 +166,7 @@ def test_equals_the_plain_version_of_the_law() -> None:
 
 
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
-@pytest.mark.parametrize("case", ["gravitation", "finish", "box"])
+@pytest.mark.parametrize("case", ["gravitation", "finish", "box", "one way", "one way within a cut-off"])
 def test_compiled_gives_the_bits_of_any_number_of_threads(case: str, dtype: str) -> None:
     import numba
 

@@ -6,7 +6,8 @@ import numba
 import numpy as np
 import pytest
 
-from pointmass.engine.support import added, columns, exponent, scaled, significand, subtracted
+from pointmass.engine.support import added, columns, exponent, scaled, significand, streamed, subtracted
+from pointmass.engine.threads import LINE
 
 
 @numba.njit(error_model="numpy")
@@ -63,3 +64,20 @@ def test_records_become_columns_and_are_added(run, dtype):
     before[4:8] += acts[8:12]
     before[8:12] -= acts[:4]
     assert np.array_equal(totals, before)
+
+
+@numba.njit(error_model="numpy")
+def keep(target, o, source):
+    streamed(target, np.uintp(o), source)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("run", [keep, keep.py_func], ids=["compiled", "plain"])
+def test_a_line_is_copied_wherever_it_begins(run, dtype):
+    source = np.random.default_rng(1).normal(size=4 * LINE).astype(dtype)
+    count = LINE // source.itemsize
+    for o in range(2 * count):  # at the beginning of a line of memory, and between two
+        target = np.zeros_like(source)
+        run(target, o, source)
+        assert np.array_equal(np.flatnonzero(target), np.arange(o, o + count))
+        assert np.array_equal(target[o : o + count], source[o : o + count])

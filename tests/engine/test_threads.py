@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import time
+from functools import partial
 
 import pytest
 
@@ -133,3 +134,25 @@ def test_what_goes_wrong_in_a_thread_comes_out() -> None:
 
     with pytest.raises(ValueError, match="0 to"):
         spread(work, 1000, 1)
+
+    def missing(lo: int, hi: int) -> None:
+        raise IndexError(f"{lo} to {hi}")
+
+    with pytest.raises(IndexError, match="0 to"):
+        spread(missing, 1000, 1)
+
+
+def test_work_that_spreads_work_comes_to_an_end() -> None:
+    seen = [0] * 64
+
+    def outer(lo: int, hi: int) -> None:
+        for row in range(lo, hi):
+            spread(partial(inner, 8 * row), 8, 1)
+
+    def inner(begin: int, lo: int, hi: int) -> None:
+        time.sleep(0.001)
+        for k in range(begin + lo, begin + hi):
+            seen[k] += 1
+
+    spread(outer, 8, 1)
+    assert seen == [1] * 64

@@ -139,7 +139,7 @@ def test_logarithmic_decrement():
     np.testing.assert_allclose(np.log(stretch[:-1] / stretch[1:]), 0.631484, rtol=1e-4)
 
 
-def test_a_rigid_rotation_is_not_damped():
+def test_F05_a_rigid_rotation_is_not_damped():
     rod = Particles([[-0.5, 0, 0], [0.5, 0, 0]], [[0, -1, 0], [0, 1, 0]])
     springs = Springs([(0, 1)], k_s=0.0, k_d=5.0, rest=1.0)
     springs.bind(rod)

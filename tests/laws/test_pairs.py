@@ -57,7 +57,7 @@ def evaluate(force: Any, p: pm.Particles, x: Any = None, v: Any = None, t: float
 
 @pytest.mark.parametrize("box", [None, (2.2, 2.5, 3.0), (4.0, 4.5, 2.1)])
 @pytest.mark.parametrize(("cutoff", "spread"), [(0.4, 4.0), (1.0, 4.0), (1.0, 1.0), (0.05, 100.0)])
-def test_pairs_are_those_of_brute_force(cutoff, spread, box):
+def test_F13_pairs_are_those_of_brute_force(cutoff, spread, box):
     x = np.random.default_rng(5).uniform(-spread, spread, (120 if box else 500, 3))
     i, j = pairs_within(x, cutoff, box)
     found = list(zip(i.tolist(), j.tolist(), strict=True))
@@ -65,6 +65,46 @@ def test_pairs_are_those_of_brute_force(cutoff, spread, box):
     moved = x if box is None else x % np.array(box)
     assert set(found) == naive.near_pairs(moved.tolist(), cutoff, box)
     assert len(set(found)) == len(found)
+
+
+@pytest.mark.parametrize("box", [None, (2.2, 2.5, 3.0)])
+@pytest.mark.parametrize(("count", "others"), [(100, 3), (3, 100), (20, 30), (0, 5), (5, 0)])
+def test_pairs_with_others_are_those_of_brute_force(count, others, box):
+    x = np.random.default_rng(5).uniform(0, 2, (count + others, 3))
+    i, j = pairs_within(x[:count], 0.7, box, x[count:])
+    found = list(zip(i.tolist(), (j + count).tolist(), strict=True))
+    assert found == sorted(found)
+    want = naive.near_pairs(x.tolist(), 0.7, box)
+    assert found == sorted((a, b) for a, b in want if a < count <= b)
+
+
+def test_one_way():
+    """Some act on others, and some on themselves, too."""
+    p = cloud()
+    for cutoff in (None, 1.3):
+        f = evaluate(coulomb(cutoff=cutoff, on=[0, 1, 2, 3], by=[3, 4, 8]), p)
+        want = np.zeros((9, 3))
+        for i in (0, 1, 2, 3):
+            for j in (3, 4, 8):
+                d = X[i] - X[j]
+                if i != j and np.linalg.norm(d) < (cutoff or np.inf):
+                    want[i] += CHARGE[i] * CHARGE[j] * d / np.linalg.norm(d) ** 3
+        np.testing.assert_allclose(f, want, rtol=0, atol=1e-13 * np.abs(want).max())
+
+
+def test_what_acts_one_way_has_no_energy_and_follows_births_and_deaths():
+    potential = {"potential": lambda x1, v1, m1, x2, v2, m2, t, k: k}
+    law = pm.pair_force(**potential)(lambda x1, v1, m1, x2, v2, m2, t, k=1.0: k * (x1 - x2))
+    p = cloud()
+    assert pm.ParticleSystem(p, [law()]).energy().potential == 36.0
+    system = pm.ParticleSystem(p, [law(on=[0, 5], by=[1, 2])])
+    assert system.energy().potential == 0.0
+    system.remove([0, 1])
+    system.add([[0, 0, 0]], charge=[0.0])
+    f = system.deriv_eval().reshape(2, -1, 3)[1] * p.m[:, None]
+    want = np.zeros((8, 3))
+    want[3] = X[5] - X[2]
+    np.testing.assert_allclose(f, want, rtol=0, atol=1e-15)
 
 
 def test_few_none_and_lost_particles_have_no_pairs():
@@ -89,7 +129,10 @@ def test_a_law_of_sums_with_a_finish():
     assert not coulomb().velocity_dependent
 
 
-@pytest.mark.parametrize("force", [fluid(), fluid(cutoff=3.0), coulomb(k=2.0), coulomb(cutoff=None)])
+@pytest.mark.parametrize(
+    "force",
+    [fluid(), fluid(cutoff=3.0), coulomb(k=2.0), coulomb(cutoff=None), fluid(on=[0, 1, 5, 6, 8], by=[2, 4, 5, 7])],
+)
 def test_jacobian_of_own_laws(force):
     p = cloud()
     force.bind(p)

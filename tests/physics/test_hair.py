@@ -65,7 +65,7 @@ LINE = 1300 * math.pi * 4e-5**2  # kg/m
 
 
 @pytest.mark.parametrize("links", [10, 20])
-def test_sag_of_a_cantilever(links: int) -> None:
+def test_H03_sag_of_a_cantilever(links: int) -> None:
     """m g l^2 / k_b N (N + 1)(N + 2)(3 N + 1) / 24: the moments of the weights at each joint.
 
     At a sag of 0.8% the shortening of the arms is of the order (sag/S)^2.

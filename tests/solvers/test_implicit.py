@@ -59,7 +59,7 @@ def test_the_chain_has_the_jacobian_it_says():
     np.testing.assert_allclose(system.jacobian(0.0, y).toarray(), numeric.toarray(), atol=1e-4)  # entries of 1e3
 
 
-def test_conjugate_gradients_solve_the_linear_system_of_backward_euler():
+def test_I15_conjugate_gradients_solve_the_linear_system_of_backward_euler():
     """One linearised step at rest, where the Jacobian is symmetric, against a dense solution."""
     system, y = chain()
     h, n = 0.01, system.dim // 2
@@ -71,7 +71,7 @@ def test_conjugate_gradients_solve_the_linear_system_of_backward_euler():
     np.testing.assert_allclose(ours, dense, rtol=0.0, atol=1e-8 * np.abs(dense).max())
 
 
-def test_one_newton_step_differs_by_the_third_power_of_h():
+def test_I15_one_newton_step_differs_by_the_third_power_of_h():
     system, y = chain()
     y = run(system, ImplicitEuler(), y, 0.002, 20)[-1]  # moving, so that no term vanishes
     h = 0.1 * np.sqrt(0.1 / 100.0) * 0.5 ** np.arange(4)
@@ -97,12 +97,14 @@ def test_direct_and_conjugate_gradients_agree(solver, islands):
 @pytest.mark.parametrize("linear", ["direct", "cg"])
 @pytest.mark.parametrize("solver", ALL)
 def test_islands_do_not_influence_each_other(solver, linear):
+    """To the tolerance: in the plane, blocks of three unknowns are others where an island begins elsewhere."""
     system, y = chain(islands=3)
-    together = run(system, solver(linear), y, 0.01, 5)[-1]
+    exact = solver(linear, cg_tolerance=1e-10)
+    together = run(system, exact, y, 0.01, 5)[-1]
     alone_system, _ = chain()
     for i in range(3):
         own = np.flatnonzero(system.islands == i)
-        alone = run(alone_system, solver(linear), y[own], 0.01, 5)[-1]
+        alone = run(alone_system, exact, y[own], 0.01, 5)[-1]
         np.testing.assert_allclose(together[own], alone, rtol=0.0, atol=1e-12)
 
 
@@ -146,6 +148,35 @@ def test_stiff_chain_falls_and_stays_whole(solver, linear):
     x = states[-1, :20].reshape(10, 2)
     np.testing.assert_allclose(np.linalg.norm(np.diff(x, axis=0), axis=1), 0.1, rtol=1e-2)
     assert x[-1, 1] < -0.5
+
+
+@pytest.mark.parametrize(("linear", "most"), [("direct", 5), ("cg", 9)])
+@pytest.mark.parametrize("solver", ALL)
+def test_a_step_whose_equations_are_not_solved_is_divided(solver, linear, most):
+    """One of two islands swings fast: it makes halves, with the memory of each, and its neighbour a whole step."""
+    system, y = chain(k=1e4, islands=2)
+    y[24:] = 30.0 * np.sin(np.arange(8)) * np.tile([0.0, 1.0], 4)
+    hasty = solver(linear, max_iterations=most)
+    memory, h = hasty.start(system), 1.0 / 60.0
+    step = hasty.step(system, 0.0, y, h, memory)
+    own = system.islands == 0
+    assert step.rejected > 0
+    assert np.array_equal(step.y1[own], solver(linear).step(system, 0.0, y, h, memory).y1[own])
+    length, at, now = np.where(own, 0.0, 0.5 * h), np.zeros(len(y)), y
+    for _ in range(2):
+        half = hasty.step(system, at, now, length, memory)
+        at, now, memory = at + length, half.y1, half.memory
+    assert np.array_equal(step.y1[~own], now[~own])
+    for name, values in step.memory.items():
+        assert np.array_equal(values[~own], memory[name][~own])
+    assert step.iterations > half.iterations
+
+
+def test_a_step_that_is_divided_to_no_avail_is_an_error():
+    system, y = chain(k=1e4)
+    y[8:] = 1e6
+    with pytest.raises(Diverged, match="not solved after 1 Newton iterations"):
+        ImplicitEuler(max_iterations=1).step(system, 0.0, y, 1.0, {})
 
 
 def test_bdf2_restarts_entry_by_entry():

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import pointmass as pm
-from pointmass.tracing.noise import mean_square, noise_of
+from pointmass.tracing.columns import source
+from pointmass.tracing.noise import mean_square, noise_of, single
 from pointmass.tracing.trace import trace
 
 sys.path.append(str(Path(__file__).parents[1]))
@@ -117,3 +118,19 @@ def test_refusals():
         pm.noise(0.0, 0.0, 0.0, octaves=2, gain=-1)
     with pytest.raises(pm.InvalidInput, match="takes 5 argument"):
         pm.Field(("noise(x, y)", "0", "0"))
+
+
+def test_what_is_asked_at_one_place_is_computed_by_one_call():
+    """Components share their hashes, and have the bits that each has alone."""
+    x, y, z, t = np.random.default_rng(2).uniform(-5, 5, (4, 30))
+
+    def law(x, y, z, t):
+        return *(single((x, y, z), 7.0, k) for k in range(3)), single((t, y, z), 7.0)
+
+    traced = trace(law, dict.fromkeys("xyzt", "scalar"), 4)
+    assert source(traced.program, traced.inputs, "law").count("calls[") == 2
+    alone = [
+        *(noise_of(k, (0, 0, 0)).columns(x, y, z, 7.0) for k in range(3)),
+        noise_of(0, (0, 0, 0)).columns(t, y, z, 7.0),
+    ]
+    np.testing.assert_array_equal(traced.columns(x, y, z, t), alone)

@@ -4,11 +4,14 @@ from pointmass.bodies.body import BODIES, Body, join
 from pointmass.bodies.chain import chain
 from pointmass.bodies.cloth import cloth
 from pointmass.bodies.cloth_from_mesh import cloth_from_mesh
+from pointmass.bodies.fish import fish
 from pointmass.bodies.hair import hair
+from pointmass.bodies.jelly import jelly
 from pointmass.bodies.lattice import lattice
 from pointmass.bodies.net import net
 from pointmass.bodies.points import points
 from pointmass.bodies.scatter import scatter
+from pointmass.bodies.snake import snake, worm
 
 __all__ = [
     "BODIES",
@@ -16,10 +19,14 @@ __all__ = [
     "chain",
     "cloth",
     "cloth_from_mesh",
+    "fish",
     "hair",
+    "jelly",
     "join",
     "lattice",
     "net",
     "points",
     "scatter",
+    "snake",
+    "worm",
 ]

@@ -85,7 +85,7 @@ def join(bodies: Sequence[Body], names: Sequence[str], dtype: Any) -> tuple[Part
     """One set of particles from several bodies, each a group under its name, and all their forces.
 
     A body's own group, such as "top edge", is a group "NAME top edge"; where no other body has one of that name, also
-    "top edge". Its surface has its name.
+    "top edge". Its surface and its skin have its name.
 
     Raises
     ------
@@ -110,7 +110,8 @@ def join(bodies: Sequence[Body], names: Sequence[str], dtype: Any) -> tuple[Part
             whole.tag(group, rows[mask])
         for surface, drawn in p.surfaces.items():
             called = name if len(p.surfaces) == 1 else f"{name} {surface}"
-            whole.cover(called, drawn.triangles + offset, drawn.uv)
+            skin = drawn.skin and drawn.skin.shifted(offset)
+            whole.cover(called, drawn.triangles + offset, drawn.uv, drawn.inside + offset, skin)
         whole.pin(rows[p.pinned])
         for force in part.forces:
             forces.append(force.shifted(offset) if isinstance(force, ElementForce) else _limited(force, rows))

@@ -27,6 +27,7 @@ def net(
     velocity: Any = (0.0, 0.0, 0.0),
     mass: float = 0.02,
     stiffness: float = 200.0,
+    slack: float = 0.0,
     damping_ratio: float = 0.1,
     radius: float = 0.0,
     pinned: Any = "none",
@@ -43,6 +44,7 @@ def net(
     velocity : at the start [m/s].
     mass : of a metre of rope [kg/m]; a particle has half of each of its links.
     stiffness : tension of a rope for each unit of strain [N].
+    slack : how much longer each rope is than its way in the flat net, relative; it hangs through by that.
     damping_ratio : of one link between two of the masses, 1 = critical.
     radius : of a particle [m].
     pinned : knots that are held: "top corners", "top edge", "left edge", "corners", "edges", ..., a list of such names,
@@ -60,6 +62,7 @@ def net(
     dx, dy = grid.cell
     across = len(grid.pairs(0, 1))
     rest = np.repeat(np.where(np.arange(len(sides)) < across, dx, dy) / links, links)
+    rest = rest * (1 + number("slack", slack, at_least=0, at_most=1))
     weight = number("mass", mass, above=0, unit="kg/m") * rest
     m = np.bincount(pairs.ravel(), np.repeat(0.5 * weight, 2), len(x))
     particles = Particles(x, velocity, m, number("radius", radius, at_least=0, unit="m"))

@@ -89,6 +89,7 @@ def report(scene: Scene, simulation: Simulation, found: Stability, counts: dict[
     return {
         "scene": scene.name,
         "solver": found.solver,
+        "solver_reason": simulation.solver_reason or None,
         "dt": dt,
         "largest_safe_dt": finite(largest),
         "recommended_dt": recommended,
@@ -162,7 +163,7 @@ def _text(result: dict[str, Any], found: Stability) -> str:
         ("fastest motion", found.motion),
         *(("" if k else "carried by", line) for k, line in enumerate(_carriers(result))),
         *(("" if k else "elements", line) for k, line in enumerate(_table(result["families"]))),
-        ("solver", result["solver"]),
+        ("solver", result["solver_reason"] or result["solver"]),
         ("dt", f"{result['dt']:.4g} s"),
         ("largest safe dt", _largest(result)),
         ("verdict", _verdict(result)),

@@ -18,6 +18,8 @@ KINDS = {
     "emitters": "emitter",
     "zones": "zone",
     "motions": "motion",
+    "constraints": "constraint",
+    "controllers": "controller",
     "solver": "solver",
 }
 COMMON = {  # parameters that most types have and few explain

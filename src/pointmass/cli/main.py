@@ -24,6 +24,8 @@ COMMANDS = {  # module by name of the command, in the order of the help
     "list": "listing",
     "run": "run",
     "render": "render",
+    "view": "view",
+    "replay": "replay",
     "check": "check",
     "export": "export",
     "new": "new",

@@ -16,6 +16,8 @@ from pointmass.errors import InvalidInput, number, unknown, whole_number
 
 if TYPE_CHECKING:
     from pointmass.scene import Scene
+    from pointmass.scenes import ShippedScene
+    from pointmass.viewer.subject import Subject
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -61,7 +63,7 @@ def run_options(command: Command) -> Command:
             click.option("--fps", type=float, help="Frames for a second of simulated time [1/s]."),
             click.option("--dt", type=float, help="Step of the solver [s]."),
             click.option("--substeps", type=int, help="Steps for each frame: dt = 1/(fps N)."),
-            click.option("--solver", help="Such as rk4; see pointmass list."),
+            click.option("--solver", help="Such as rk4, see pointmass list; auto chooses."),
             click.option("--seed", type=int, help="Seed of all chance while it runs."),
             click.option("--dtype", help="float64 or float32."),
             click.option("--preset", help="Of a shipped scene, such as geyser of fountain; see pointmass list."),
@@ -87,10 +89,33 @@ def load_scene(source: str, options: RunOptions) -> Scene:
     InvalidInput
         No such scene, a file that is no scene, an option that is not allowed.
     """
-    use_threads(options.threads)
-    if options.dt is not None and options.substeps is not None:
-        raise InvalidInput("--dt and --substeps both set the step: give one of them")
+    _prepare(options)
     return _with_options(_described(source, _settings(options.settings), options.preset), options)
+
+
+def load_subject(source: str, options: RunOptions) -> Subject:
+    """The scene that a command line names, with parameters that a live page can turn.
+
+    Raises
+    ------
+    InvalidInput
+        As for `load_scene`.
+    """
+    from pointmass.viewer.subject import Subject
+
+    kind = shipped(source)
+    if kind is None:
+        return Subject.of_scene(load_scene(source, options))
+    _prepare(options)
+    scene = kind.with_settings(_settings(options.settings), options.preset)
+    return Subject.of_shipped(scene, lambda built: _with_options(built, options))
+
+
+def shipped(source: str) -> type[ShippedScene] | None:
+    """The shipped scene of this name, if no file has it."""
+    from pointmass.scenes import SCENES
+
+    return None if Path(source).is_file() else SCENES.get(source)
 
 
 def default_output(source: str, suffix: str) -> Path:
@@ -106,6 +131,12 @@ def parse_size(text: str) -> tuple[int, int]:
     return int(match[1]), int(match[2])
 
 
+def _prepare(options: RunOptions) -> None:
+    use_threads(options.threads)
+    if options.dt is not None and options.substeps is not None:
+        raise InvalidInput("--dt and --substeps both set the step: give one of them")
+
+
 def _described(source: str, settings: dict[str, Any], preset: str | None) -> Scene:
     path = Path(source)
     if path.suffix == ".toml" or path.is_file():
@@ -118,19 +149,21 @@ def _described(source: str, settings: dict[str, Any], preset: str | None) -> Sce
         return Scene.load(path, settings)
     from pointmass.scenes import SCENES
 
-    if source in SCENES:
-        return SCENES[source].with_settings(settings, preset).build()
+    kind = shipped(source)
+    if kind is not None:
+        return kind.with_settings(settings, preset).build()
     if path.is_dir():
         raise InvalidInput(f"{source!r} is a folder, not a scene: give a TOML file or one of {', '.join(SCENES)}")
     raise unknown("scene", source, SCENES)
 
 
 def _with_options(scene: Scene, options: RunOptions) -> Scene:
+    from pointmass.solver_choice import AUTO
     from pointmass.solvers import find_solver
 
     changes: dict[str, Any] = {name: getattr(options, name) for name in ("frames", "fps", "dt", "seed", "dtype")}
     if options.solver is not None:
-        changes["solver"] = find_solver(options.solver)()
+        changes["solver"] = AUTO if options.solver == AUTO else find_solver(options.solver)()
     changes = {name: value for name, value in changes.items() if value is not None}
     if options.substeps is not None:
         fps = number("fps", changes.get("fps", scene.fps), above=0, unit="1/s")

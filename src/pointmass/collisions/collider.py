@@ -148,6 +148,11 @@ class Collider(Described, ABC):
         return np.broadcast_to(result, len(x))
 
     @property
+    def detail(self) -> float:
+        """Within a triangle whose corners are not farther than this from its middle, the distance is convex [m]."""
+        return np.inf
+
+    @property
     def surfaces(self) -> Sequence[Collider]:
         """The surfaces that it consists of, each with a smooth distance: a room has six walls."""
         return (self,)

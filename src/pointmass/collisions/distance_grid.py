@@ -173,6 +173,11 @@ class DistanceGrid(LookedUp):
         counts = self.values.shape
         return (self.sign, *self.origin.tolist(), *(1 / self.spacing).tolist(), *counts, *self.extent.tolist())
 
+    @property
+    def detail(self) -> float:
+        """One spacing."""
+        return float(self.spacing.min())
+
     def look(self, x: Array) -> tuple[Array, Array]:
         p = (x - self.origin).T
         inverse, counts = 1 / self.spacing, self.values.shape

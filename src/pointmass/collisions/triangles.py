@@ -119,7 +119,7 @@ class TriangleTree:
         self.leaves = 2**levels
         order = _order(mesh.corners.mean(axis=1), levels)
         self.corners = mesh.corners[order]
-        self.numbers = _numbers(self.corners, mesh.normals[order])
+        self.numbers = triangle_numbers(self.corners, mesh.normals[order])
         self.normals = feature_normals(mesh)[order]
         self.boxes = _boxes(self.corners, levels)
         self.extent = float(np.abs(mesh.vertices).max())
@@ -127,8 +127,8 @@ class TriangleTree:
     def nearest(self, x: Array) -> tuple[Array, Array, Array, Rows]:
         """For each point, shape (k, 3): what `triangle_law` says of the nearest triangle, and its number.
 
-        The search is not that of the kernels: it looks at all triangles that are within reach of a point's nearest
-        corner.
+        The search is not that of the kernels: it looks at all triangles in leaves that are no farther than a point's
+        nearest corner.
         """
         square, q, feature = np.full(len(x), np.nan), np.full((len(x), 3), np.nan), np.zeros(len(x))
         which = np.zeros(len(x), np.intp)
@@ -146,25 +146,29 @@ class TriangleTree:
         return square, q, feature, which
 
     def _candidates(self, x: Array) -> tuple[Rows, Rows]:
-        """Pairs of a point and a triangle that may be its nearest."""
-        corners, middles, radii = self._balls
-        reach, _ = corners.query(x)
+        """Pairs of a point and a triangle that may be its nearest: down the tree, all boxes within reach at once."""
+        reach, _ = self._corners.query(x)
         reach = reach + 4 * SLACK * (self.extent + np.abs(x).sum(axis=1))
-        found = middles.query_ball_point(x, reach + radii.max())
-        point = np.repeat(np.arange(len(x)), [len(f) for f in found])
-        candidate = np.concatenate(found).astype(np.intp)
-        away = np.linalg.norm(x[point] - middles.data[candidate], axis=1)
-        near = away <= reach[point] + radii[candidate]
-        return point[near], candidate[near]
+        point, node = np.arange(len(x)), np.ones(len(x), np.intp)
+        for level in range(self.leaves.bit_length()):
+            if level:
+                point, node = np.repeat(point, 2), (2 * node[:, None] + (0, 1)).ravel()
+            low, high = np.split(self.boxes[node], 2, axis=1)
+            here = x[point]
+            apart = np.maximum(np.maximum(low - here, here - high), 0.0)
+            near = np.linalg.norm(apart, axis=1) <= reach[point]
+            point, node = point[near], node[near]
+        first, end = ((node - self.leaves + k) * len(self.corners) // self.leaves for k in (0, 1))
+        count = end - first
+        before = np.cumsum(count) - count
+        return np.repeat(point, count), np.arange(count.sum()) + np.repeat(first - before, count)
 
     @cached_property
-    def _balls(self) -> tuple[Any, Any, NDArray[np.float64]]:
-        """Trees of the corners and of the middles, and how far each triangle reaches from its middle."""
+    def _corners(self) -> Any:
+        """A tree of the corners."""
         from scipy.spatial import cKDTree
 
-        middle = self.corners.mean(axis=1)
-        radius = np.linalg.norm(self.corners - middle[:, None], axis=2).max(axis=1)
-        return cKDTree(np.unique(self.corners.reshape(-1, 3), axis=0)), cKDTree(middle), radius
+        return cKDTree(np.unique(self.corners.reshape(-1, 3), axis=0))
 
 
 def feature_normals(mesh: TriangleMesh) -> NDArray[np.float64]:
@@ -214,7 +218,8 @@ def _boxes(corners: Array, levels: int) -> NDArray[np.float64]:
     return boxes
 
 
-def _numbers(corners: Array, normals: Array) -> NDArray[np.float64]:
+def triangle_numbers(corners: Array, normals: Array) -> NDArray[np.float64]:
+    """Corner 0 of each triangle, and what `triangle_law` takes beside the point, shape (k, 17)."""
     a, e1, e2 = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     one, both, two = (e1 * e1).sum(axis=1), (e1 * e2).sum(axis=1), (e2 * e2).sum(axis=1)
     third = ((e2 - e1) ** 2).sum(axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -75,6 +76,14 @@ class Triangulated(LookedUp):
         numbers = (self.half, self.sign, SMALL * self.tree.extent)
         distance, *normal = outcome().columns(*q.T, square, feature, *normals.T, *numbers)
         return distance, np.stack(normal, axis=1)
+
+    @cached_property
+    def detail(self) -> float:
+        """Half the median edge, unless the whole solid is convex."""
+        if self.sign > 0 and self.triangles.convex:
+            return np.inf
+        sides = self.triangles.corners - np.roll(self.triangles.corners, 1, axis=1)
+        return 0.5 * float(np.median(np.linalg.norm(sides, axis=2)))
 
     def mesh(self, size: float) -> tuple[Array, NDArray[np.int32]]:
         faces = self.triangles.faces.astype(np.int32)

@@ -22,8 +22,8 @@ class Voxels:
     origin : lower corner [m], shape (3,).
     size : of a cube [m].
     counts : cubes along each axis, shape (3,).
-    bounds : lower bound of the signed distance of all points in each cube [m], -1 where the mesh may pass, or the cube
-        is inside of the solid; z runs fastest.
+    bounds : lower bound of the signed distance of each cube's middle [m], exact where the mesh may pass through the
+        cube, and -1 deep in the solid; z runs fastest. A point of the cube is as much nearer as it is from the middle.
     hints : a triangle near each cube's middle.
 
     Parameters
@@ -49,14 +49,23 @@ class Voxels:
         away, nearest = distance_transform_edt(taken < 0, return_indices=True)
         self.hints = taken[tuple(nearest)].ravel()
         # A point and the sample that it is nearest to are each up to half a diagonal from the middles of their cubes.
-        least = (away - np.sqrt(3)) * self.size - apart
+        half_diagonal = 0.5 * np.sqrt(3) * self.size
+        least = away * self.size - 2 * half_diagonal - apart
         # What is connected through cubes that the mesh does not pass lies on one side of it.
         parts, count = label(least > 0)
+        free = np.ones(count + 1, bool)
         if count:
             found = np.array(maximum_position(least, parts, np.arange(1, count + 1)))
-            free = np.append(False, distance(self.origin + self.size * (found + 0.5)) > 0)
-            least = np.where(free[parts], least - half, -1.0)
-        self.bounds: NDArray[np.float64] = np.where(least > 0, least, -1.0).ravel()
+            free[1:] = distance(self._middles(found)) > 0
+        bounds = np.where(free[parts], least + half_diagonal - half, -1.0)
+        near = np.argwhere(least <= half)
+        bounds[tuple(near.T)] = distance(self._middles(near))
+        self.bounds: NDArray[np.float64] = bounds.ravel()
+
+    def _middles(self, cubes: NDArray[np.intp]) -> Array:
+        """Of cubes, shape (k, 3)."""
+        result: Array = self.origin + self.size * (cubes + 0.5)
+        return result
 
 
 def _samples(corners: Array, spacing: float) -> tuple[Array, NDArray[np.intp], float]:

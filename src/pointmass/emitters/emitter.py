@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -43,11 +44,16 @@ class Birth:
         """Ids that no other particle of the run has or will have."""
         return np.where(self.number < HASHED, (np.int64(emitter + 1) << CHILDREN) + self.number, self.number)
 
-    def take(self, rows: NDArray[np.intp]) -> Birth:
+    def take(self, rows: NDArray[np.intp] | slice) -> Birth:
         """Some of them."""
         columns = {name: self.column(name)[rows] for name in self.columns}
         arrays = (self.time[rows], self.number[rows], self.x[rows], self.v[rows], self.lifetime[rows])
         return Birth(*arrays, columns)
+
+    def parted(self, times: Array) -> list[Birth]:
+        """Those between each two of some times that follow each other, if all are in order of time."""
+        ends = np.searchsorted(self.time, times).tolist()
+        return [self.take(slice(a, b)) for a, b in pairwise(ends)]
 
     def column(self, name: str) -> Array:
         """A column, of the number that particles have by default if the emitter does not set it, shape (k,)."""

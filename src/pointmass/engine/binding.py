@@ -18,10 +18,9 @@ from pointmass.engine.printing import Call, statements
 from pointmass.laws.force import Force
 from pointmass.laws.grid import Grid, GridLookup
 from pointmass.laws.parameter import Component, Parameter
-from pointmass.particles import Particles
+from pointmass.particles import Particles, read_only
 from pointmass.tracing.columns import expanded
-from pointmass.tracing.noise import Function
-from pointmass.tracing.program import Primitive, Program
+from pointmass.tracing.program import Function, Primitive, Program
 from pointmass.tracing.trace import Traced, vector_names
 
 Array = NDArray[np.floating[Any]]
@@ -69,6 +68,29 @@ class Table:
         return self._last
 
 
+class Watched:
+    """Columns that may change between two looks.
+
+    One that nobody can write, and that is still the same array, is the same.
+    """
+
+    def __init__(self) -> None:
+        self._known: list[Array] | None = None  # as they were given
+        self._copies: list[Array] = []  # as they were
+
+    def changed(self, columns: Sequence[Array]) -> bool:
+        """Whether these are not what was given the last time, or the first ones."""
+        if self._known is not None and all(map(self._same, columns, self._known, self._copies)):
+            return False
+        self._known = list(columns)
+        self._copies = [column.copy() if column.flags.writeable else column for column in columns]
+        return True
+
+    @staticmethod
+    def _same(now: Array, known: Array, copy: Array) -> bool:
+        return (now is known and not now.flags.writeable) or bool(np.array_equal(now, copy))
+
+
 class Packed:
     """Columns of some tables in the order of a fast path, packed anew only when one of them has changed.
 
@@ -88,14 +110,13 @@ class Packed:
     ) -> None:
         self._columns = [(get, order) for t, order in zip(tables, orders, strict=True) for get in t.getters]
         self._dtype, self._pack = dtype, pack
-        self._raw: list[Array] | None = None  # columns as they were, in the order of the system
+        self._watched = Watched()
         self._arrays: tuple[Array, NDArray[np.int64]]
 
     def arrays(self) -> tuple[Array, NDArray[np.int64]]:
         """All columns, and where each begins and how far its next part is."""
         raw = [get() for get, _ in self._columns]
-        if self._raw is None or not all(map(np.array_equal, raw, self._raw)):
-            self._raw = [column.copy() for column in raw]
+        if self._watched.changed(raw):
             packed = [
                 self._pack(c[order].astype(self._dtype)) for c, (_, order) in zip(raw, self._columns, strict=True)
             ]
@@ -169,6 +190,7 @@ class Binder:
         if "w" not in equal:
             self.attribute("w", "")
         self._grids: list[Grid] = []
+        self._masks: dict[tuple[int, str], Array] = {}  # of groups, by the version of the particles
         self._functions: dict[Hashable, tuple[str, str]] = {}  # name and text, in the order in which laws need them
 
     @property
@@ -284,6 +306,16 @@ class Binder:
         return self.numbers.number(f"enabled {id(force)}", lambda: float(force.enabled))
 
     def _mask(self, force: Force) -> Array:
+        p = self.particles
+        if not isinstance(force.on, str):
+            return self._acts_on(force)
+        key = p.version, force.on
+        if key not in self._masks:
+            self._masks = {known: mask for known, mask in self._masks.items() if known[0] == p.version}
+            self._masks[key] = read_only(self._acts_on(force))
+        return self._masks[key]
+
+    def _acts_on(self, force: Force) -> Array:
         mask = np.zeros(len(self.particles), self.particles.dtype)
         mask[self.particles.select(force.on)] = 1
         return mask
@@ -330,7 +362,7 @@ def equal_columns(particles: Particles) -> frozenset[str]:
     """Columns that are the same for all particles: masses, inverse masses and radii."""
     p = particles
     found = {name for name in ("m", "radius") if len(p) and bool((p.column(name) == p.column(name)[0]).all())}
-    return frozenset(found | {"w"} if "m" in found and not p.pinned.any() else found)
+    return frozenset(found | {"w"} if "m" in found and not p.has_pins else found)
 
 
 def kinds(forces: list[Force]) -> tuple[Any, ...]:

@@ -59,6 +59,7 @@ RECORD = {  # of a contact, with the size of each
 }
 REMEMBERED = 8  # numbers: whether there is a point, its place, distance and normal; what a search remembers is behind
 RESPONSES = get_args(Response)
+TRIAL = ("find", "settle", "strike", "evict")  # what a kernel calls before and after each trial
 WIDE = 1.000001  # times a way: more than the roundings of ways
 ROUNDING = {"float64": 1e-13, "float32": 1e-6}  # of the places between which `clear` looks, on top of eps
 PATH = [f"{p}{end}" for end in "01" for p in ("x", "y", "z", "u", "v", "w")]
@@ -73,6 +74,7 @@ class ContactText:
     order : of the system.
     lagged : whether the solver is implicit.
     dtype : of the state, "float64" or "float32": how large its round-off is.
+    trial : flags of the functions that follow each trial: a kernel that calls them in one place may inline them.
 
     Attributes
     ----------
@@ -83,7 +85,9 @@ class ContactText:
     looks_up : whether the distance of a surface is looked up in data.
     """
 
-    def __init__(self, surfaces: Sequence[Collider], order: int, lagged: bool, dtype: str) -> None:
+    def __init__(
+        self, surfaces: Sequence[Collider], order: int, lagged: bool, dtype: str, trial: str = "**APART"
+    ) -> None:
         self.surfaces, self._dtype = surfaces, dtype
         self._memory = 1 + sum(RECORD.values()) * len(surfaces)
         self.looks_up = any(s.lookup for s in surfaces)
@@ -98,7 +102,10 @@ class ContactText:
         self.kills = any(s.response == "kill" for s in surfaces)
         self.discrete = order == 2 and any(s.contact == "discrete" for s in surfaces)
         printed = [*self._constants(order, lagged), "", *self._laws(), *self._places()]
-        self.text = "\n".join([*printed, body_of("contact_text.py"), *self._lookups(), *self._clear()])
+        body = body_of("contact_text.py")
+        for name in TRIAL:
+            body = body.replace(f"@njit(**APART)\ndef {name}(", f"@njit({trial})\ndef {name}(")
+        self.text = "\n".join([*printed, body, *self._lookups(), *self._clear()])
 
     def table(self) -> NDArray[np.float64]:
         """The numbers of the surfaces now, one row each, and their data behind. The next call changes this array."""
@@ -190,7 +197,8 @@ class ContactText:
         arguments = f"P, {', '.join(PATH)}, t0, h, radius"
         lines = self.clear_lines("float64", "P")
         third = f"third = h * {1 / 3!r}"
-        body = [*lines.once, *lines.step, third, *lines.begin, *lines.lane, *lines.end, f"return {lines.result}"]
+        body = [*lines.once, *lines.step, third, *lines.begin, *lines.looks]
+        body += [*lines.lane, *lines.end, f"return {lines.result}"]
         return ["@njit(**FLAGS)", f"def clear({arguments}):", *indented(body, 1), "", ""]
 
     def clear_lines(self, dtype: str, table: str) -> ClearLines:
@@ -208,13 +216,14 @@ class ContactText:
             if _flat(surface):
                 self._clear_of_plane(k, dtype, table, lines)
                 continue
+            if surface.lookup:
+                self._clear_by_bound(k, surface.lookup, dtype, table, lines)
+                continue
             if "safe = True" not in lines.begin:
                 lines.begin.append("safe = True")
                 lines.lane.append(f"far = radius + {rounding} * ({' + '.join(f'abs({p})' for p in PATH[6:9])})")
                 lines.results.append("safe")
-            if surface.lookup:
-                self._clear_by_bound(k, surface.lookup, dtype, table, lines)
-            elif surface.laws.apart is not None and not surface.moves:
+            if surface.laws.apart is not None and not surface.moves:
                 self._clear_by_hull(k, surface.laws.apart, dtype, table, lines)
             else:
                 self._clear_by_distance(k, dtype, table, lines)
@@ -222,7 +231,8 @@ class ContactText:
 
     def _clear_of_plane(self, k: int, dtype: str, table: str, lines: ClearLines) -> None:
         """The control points of the paths, whose hulls they do not leave, are all on the free side: the ends, and those
-        that are a third of a step away from an end at its velocity."""
+        that are a third of a step away from an end at its velocity. Where steps meet, one of the latter is the lowest.
+        """
         tag, surface = f"q{k}_", self.surfaces[k]
         laws = surface.laws
         lines.once += [f"{tag}{a} = R({table}[{k} * ROW + PLACE + {j}])" for j, a in enumerate("xyz")]
@@ -239,13 +249,18 @@ class ContactText:
             terms = [(n, v, p) for n, v, p in zip(normal, value, parts, strict=True) if v != 0]
             return " + ".join({1.0: p, -1.0: f"(-{p})"}.get(v, f"{n} * {p}") for n, v, p in terms)
 
-        lines.begin.append(f"{tag}low = {along('x0', 'y0', 'z0')}")
-        lines.lane += [
-            f"{tag}a = {along('x0', 'y0', 'z0')} + third * ({along('u0', 'v0', 'w0')})",
-            f"{tag}b = {along('x1', 'y1', 'z1')}",
-            f"{tag}c = {tag}b - third * ({along('u1', 'v1', 'w1')})",
-            *(f"{tag}low = {tag}low if {tag}low < {tag}{p} else {tag}{p}" for p in "abc"),
+        def lower(point: str) -> str:
+            return f"{tag}low = {tag}low if {tag}low < {point} else {point}"
+
+        lines.begin += [
+            f"{tag}low = {along('x0', 'y0', 'z0')}",
+            f"{tag}a = {tag}low + third * ({along('u0', 'v0', 'w0')})",
+            lower(f"{tag}a"),
         ]
+        there = f"{tag}b = {along('x1', 'y1', 'z1')}"
+        lines.inner += [there, f"{tag}c = {tag}b - third * abs({along('u1', 'v1', 'w1')})", lower(f"{tag}c")]
+        lines.end += [there, f"{tag}c = {tag}b - third * ({along('u1', 'v1', 'w1')})"]
+        lines.end += [lower(f"{tag}b"), lower(f"{tag}c")]
         lines.results.append(f"{tag}low + {tag}gap > {tag}room + size")
 
     def _clear_by_hull(self, k: int, apart: Traced, dtype: str, table: str, lines: ClearLines) -> None:
@@ -282,12 +297,14 @@ class ContactText:
         lines.lane.append(f"safe = safe & {away}")
 
     def _clear_by_bound(self, k: int, lookup: str, dtype: str, table: str, lines: ClearLines) -> None:
-        """The start is farther away than the whole way by the bound that the surface's data give at once."""
+        """The first start is farther away than the whole way by the bound that the surface's data give at once."""
         tag, wide = f"q{k}_", literal(WIDE, dtype)
         self._way(k, table, lines)
         place = ", ".join(f"np.float64({a}0 - {tag}{a}0)" for a in "xyz")
-        lines.lane.append(f"{tag}gap = R({lookup}_bound({table}, {k}, {place})) - far")
-        lines.lane.append(f"safe = safe & ({tag}gap > {tag}near + {wide} * (way + {tag}way))")
+        apart, bound = (f"R({lookup}_{which}({table}, {k}, {place}))" for which in ("apart", "bound"))
+        lines.looked[f"{tag}gap"] = apart, bound
+        lines.lane.append(f"{tag}gap = {tag}gap - {wide} * (way + {tag}way)")
+        lines.results.append(f"{tag}gap > {tag}near + size")
 
     def _way(self, k: int, table: str, lines: ClearLines) -> None:
         """Where the surface is at the beginning and the end of a step, and the ways of surface and particle."""
@@ -309,12 +326,17 @@ class ContactText:
 class ClearLines:
     """The statements of `clear`, for one step or for several in a row.
 
+    They know a third of the longest step by the name of `third`: a longer one makes hulls and ways larger.
+
     Attributes
     ----------
     once : of the table alone.
     step : of the time t0 and the length h of a step.
     begin : of the start x0, ..., w0 of the first step and the radius.
-    lane : of a step from x0, ..., w0 to x1, ..., w1, with h/3 by the name of `third`.
+    looked : of the start, too: locals, and two expressions of their values: that which is above 0 far from all data,
+        and one that looks into the data, which no vector can do.
+    lane : of a step from x0, ..., w0 to x1, ..., w1.
+    inner : after each step but the last.
     end : after the last step.
     results : conditions that all hold if everything was clear.
     """
@@ -322,9 +344,16 @@ class ClearLines:
     once: list[str] = field(default_factory=list)
     step: list[str] = field(default_factory=list)
     begin: list[str] = field(default_factory=list)
+    looked: dict[str, tuple[str, str]] = field(default_factory=dict)
     lane: list[str] = field(default_factory=list)
+    inner: list[str] = field(default_factory=list)
     end: list[str] = field(default_factory=list)
     results: list[str] = field(default_factory=list)
+
+    @property
+    def looks(self) -> list[str]:
+        """Statements that give the locals of `looked` their values."""
+        return [f"{name} = {bound}" for name, (_, bound) in self.looked.items()]
 
     @property
     def result(self) -> str:

@@ -23,7 +23,17 @@ def distances_look(P, k, x, y, z):
 
 
 @njit(**FLAGS)
+def distances_apart(P, k, x, y, z):
+    """A lower bound of the way to the surface for places beyond the grid; for others not above 0."""
+    row = k * ROW
+    x, y, z = x - P[row + ORIGIN], y - P[row + ORIGIN + 1], z - P[row + ORIGIN + 2]
+    beyond = max(max(-x, x - P[row + REACH]), max(-y, y - P[row + REACH + 1]))
+    beyond = max(beyond, max(-z, z - P[row + REACH + 2]))
+    return beyond / P[row + STEEP] if P[row + FREE] > 0.0 else 0.0
+
+
+@njit(**FLAGS)
 def distances_bound(P, k, x, y, z):
-    """A lower bound of the way to the surface."""
+    """The same for all places."""
     gap, _, _, _ = distances_look(P, k, x, y, z)
     return gap / P[k * ROW + STEEP]

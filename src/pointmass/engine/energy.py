@@ -27,7 +27,8 @@ class PairEnergy:
             per_particle=force.per_particle,
             reach=force.reach,
             box=force.box,
-            on=force.on,
+            by=force.by,
+            ends=force.ends,
         )
         self._particles = particles
         self._binder = Binder(particles, Table("C"))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from pointmass.collisions.impacts import NO_IMPACTS, Impacts
 from pointmass.engine.binding import kinds
+from pointmass.engine.dealt import fits
 from pointmass.engine.energy import PairEnergy
 from pointmass.engine.island import IslandKernel, Outcome, Span, everybody
 from pointmass.engine.lanes import LanesKernel, topologies
@@ -25,12 +26,15 @@ from pointmass.engine.lattice import LatticeKernel, grid
 from pointmass.engine.phases import simple
 from pointmass.engine.reference import ReferenceEngine
 from pointmass.engine.singles import SingleMembers, SinglesKernel
-from pointmass.engine.threads import spread
+from pointmass.engine.threads import LINE, heed_environment, spread
 from pointmass.errors import Diverged, InvalidInput
-from pointmass.laws.elements import ElementForce
+from pointmass.laws import stencils
+from pointmass.laws.elements import ConstraintForce, ElementForce
 from pointmass.laws.force import Force
 from pointmass.laws.pairs import PairForce
+from pointmass.laws.stencils import Grid
 from pointmass.laws.unary import UnaryForce
+from pointmass.motions import NO_MOTIONS, Motions, stage_of
 from pointmass.particles import Array
 from pointmass.solvers.advance import Stats
 from pointmass.solvers.base import Memory, Solver
@@ -44,6 +48,7 @@ from pointmass.system import ParticleSystem
 Rows = NDArray[np.intp]
 GRAIN = 2**16  # rows that are worth a thread
 SMALLEST_GRID = 64  # particles of an island that may be a grid
+DEALT = 1024  # particles of a grid that is worth all threads where they need no turns
 LARGE = 4096  # particles of an island that is worth all threads
 MANY = 2000  # particles whose pairs take long in NumPy
 LARGE_IN_PAIRS = 512  # the same, where pairs of them act
@@ -65,10 +70,10 @@ class Group:
 
     Attributes
     ----------
-    rows : of the particles, island by island; None = all, in order.
+    rows : of the particles, island by island, a slice where they follow each other; None = all, in order.
     """
 
-    rows: Rows | None
+    rows: Rows | slice | None
     members: Members
 
 
@@ -83,6 +88,8 @@ class Engine:
     fastest, farthest : largest |v| [m/s] and |x| [m] of any component after the last span.
     died : rows of the particles that a surface killed in the last span, ascending; they are to be taken away.
     watched : whether steps made `ahead` tell of impacts.
+    lasting : whether who is joined to whom stays so, so that kernels for it are worth their time.
+    motions : of pinned particles.
     impacts : of the last such step.
     """
 
@@ -90,6 +97,8 @@ class Engine:
     solver: Solver
     wanted: bool
     watched: bool = False
+    lasting: bool = True
+    motions: Motions = NO_MOTIONS
     reference: ReferenceEngine = field(init=False)
     fastest: float = 0.0
     farthest: float = 0.0
@@ -106,7 +115,9 @@ class Engine:
     _structure: Rows | None = None  # islands that the groups are made of
 
     def __post_init__(self) -> None:
-        self.reference = ReferenceEngine(self.system, self.solver, watched=self.watched)
+        if self.wanted:
+            heed_environment()
+        self.reference = ReferenceEngine(self.system, self.solver, watched=self.watched, motions=self.motions)
 
     @property
     def stats(self) -> Stats:
@@ -170,7 +181,7 @@ class Engine:
     def _pairs_of_many(self) -> list[PairForce]:
         p = self.system.particles
         pairs = [f for f in self.system.forces if isinstance(f, PairForce)] if self.compiled else []
-        return [force for force in pairs if len(p.select(force.on)) > MANY]
+        return [force for force in pairs if max(map(len, force.ends(p))) > MANY]
 
     def longest(self) -> int:
         """How many steps a span may have."""
@@ -189,6 +200,11 @@ class Engine:
         for group in self._grouped(None) if self.compiled else []:
             x, v = (_taken(array, group.rows).copy() for array in (p.x, p.v))
             group.members.run(x, v, None, nothing, memory)
+
+    def of(self, system: ParticleSystem, solver: Solver) -> Engine:
+        """An engine for another system or solver, with nothing done yet."""
+        motions = replace(self.motions, stage=stage_of(solver))
+        return Engine(system, solver, self.wanted, watched=self.watched, lasting=self.lasting, motions=motions)
 
     @property
     def coupled(self) -> bool:
@@ -236,6 +252,7 @@ class Engine:
         self.reference.memory = earlier
         self.reference.step(span.start, span.end, None if births is None else np.maximum(births, span.start))
         system.set_state(after, span.end)
+        self._lead(span.end)
         self.reference.stats = stats
         self.reference.remember(memory, Stats())  # also that nobody has moved anything by hand
         return True
@@ -247,14 +264,19 @@ class Engine:
         for group in self._grouped(births) if groups is None else groups:
             x, v = _taken(p.x, group.rows), _taken(p.v, group.rows)
             clock = births if births is None or group.rows is None else births[group.rows]
-            outcome = group.members.run(x, v, clock, span, memory)
-            while outcome.again:
-                x, v = self._again(group)
+            try:
                 outcome = group.members.run(x, v, clock, span, memory)
+                while outcome.again:
+                    x, v = self._again(group)
+                    outcome = group.members.run(x, v, clock, span, memory)
+            except InvalidInput:
+                if not self.motions:
+                    raise
+                return False  # a motion is not finite in one of the steps: the reference path says in which
             outcomes.append(outcome)
             if not outcome.good:
                 return False
-            if group.rows is not None:
+            if isinstance(group.rows, np.ndarray):
                 p.x[group.rows], p.v[group.rows] = x.reshape(-1, 3), v.reshape(-1, 3)
         self.farthest, self.fastest = np.max([o.reach for o in outcomes], axis=0).tolist()
         self.died = np.unique(np.concatenate([self.died, *(o.died for o in outcomes)]))
@@ -263,15 +285,21 @@ class Engine:
         work = sum(works, Stats())
         work.steps, work.evaluations = max(w.steps for w in works), max(w.evaluations for w in works)
         self.system.t = span.end
+        self._lead(span.end)
         self.reference.remember(memory, work)
         return True
+
+    def _lead(self, t: float) -> None:
+        """Put pins that move where they are at time t."""
+        p = self.system.particles
+        self.motions.put(p, p.x, p.v, t)
 
     def _room(self) -> tuple[Array, Array]:
         """Room for the positions and velocities before a span."""
         p = self.system.particles
         n = len(p)
         if self._space.shape[1] < n or self._space.dtype != p.dtype:
-            self._space = np.empty((2, n + n // ROOM, 3), p.dtype)  # so that births seldom need more
+            self._space = _lines(n + n // ROOM, p.dtype)  # so that births seldom need more
         self._before = self._space[0, :n], self._space[1, :n]
         return self._before
 
@@ -351,7 +379,7 @@ class Engine:
         rows = np.flatnonzero(np.isin(islands, islands[rows])) if self.coupled else np.sort(rows)
         part = self.system.part(rows)
         part.particles.x[:], part.particles.v[:] = self._before[0][rows], self._before[1][rows]
-        again = ReferenceEngine(part, self.solver, watched=True)
+        again = ReferenceEngine(part, self.solver, watched=True, motions=self.motions)
         again.leave(left)
         again.step(step.start, step.end, births[rows])
         return replace(again.impacts, rows=rows[again.impacts.rows])
@@ -421,10 +449,14 @@ class Engine:
         groups = [self._made(SinglesKernel, np.flatnonzero(alone), islands, births)] if alone.any() else []
         left = np.flatnonzero(~alone)
         left = left[np.argsort(islands[left], kind="stable")]
-        if len(left) and not births:
+        if len(left) and self.lasting and not births:
             for rows, members in self._side_by_side(left, islands[left]):
                 groups.append(self._group(rows, members))
                 left = left[~np.isin(left, rows)]
+        for found in self._relaxed_grids(left, islands[left]):
+            kernel = IslandKernel(self.system, self.solver, True, self.watched, self.motions, found)
+            groups.append(self._group(found.members, kernel.members(found.members, islands[found.members])))
+            left = left[~np.isin(left, found.members)]
         large = size[left] >= (LARGE_IN_PAIRS if self._pairs else LARGE)
         for island in np.unique(islands[left[large]]):
             groups.append(self._made(IslandKernel, left[islands[left] == island], islands, True))
@@ -439,13 +471,23 @@ class Engine:
             return
         single = np.ones(len(rows), bool)
         for topology in topologies(system, rows, labels):
-            yield topology.rows.ravel(), LanesKernel(system, solver, topology).members(topology)
+            yield topology.rows.ravel(), LanesKernel(system, solver, topology, self.motions).members(topology)
             single &= ~np.isin(rows, topology.rows)
         names, counts = np.unique(labels[single], return_counts=True)
         for island in names[counts >= SMALLEST_GRID]:
             found = grid(system, rows[labels == island])
             if found is not None:
-                yield found.members, LatticeKernel(system, solver, found).members(found)
+                yield found.members, LatticeKernel(system, solver, found, self.motions).members(found)
+
+    def _relaxed_grids(self, rows: Rows, labels: Rows) -> Iterator[Grid]:
+        """Islands that are grids, for a solver that relaxes their elements."""
+        if isinstance(self.solver, XPBD) and self.lasting:
+            forces = [f for f in self.system.forces if isinstance(f, ConstraintForce) and f.enabled]
+            names, counts = np.unique(labels, return_counts=True)
+            for island in names[counts >= DEALT]:
+                found = stencils.grid(forces, self.system.particles, rows[labels == island])
+                if found is not None and fits(found):
+                    yield found
 
     @property
     def _pairs(self) -> bool:
@@ -455,7 +497,10 @@ class Engine:
         return self._group(rows, self._kernel(kind, *how).members(rows, islands[rows]))
 
     def _group(self, rows: Rows, members: Members) -> Group:
-        return Group(None if everybody(rows, len(self.system.particles)) else rows, members)
+        if everybody(rows, len(self.system.particles)):
+            return Group(None, members)
+        in_order = len(rows) > 0 and bool((np.diff(rows) == 1).all())
+        return Group(slice(int(rows[0]), int(rows[-1]) + 1) if in_order else rows, members)
 
     def _kernel(self, kind: Any, *how: bool) -> Any:
         """The kernel of a kind for the system as it is, printed once."""
@@ -464,7 +509,8 @@ class Engine:
             self._kernels = (made_of, {})
         known = self._kernels[1]
         if (kind, *how) not in known:
-            known[kind, *how] = kind(self.system, self.solver, *how, watched=self.watched)
+            more = {"motions": self.motions} if kind is IslandKernel else {}
+            known[kind, *how] = kind(self.system, self.solver, *how, watched=self.watched, **more)
         return known[kind, *how]
 
     def _kinds(self) -> tuple[Any, ...]:
@@ -473,7 +519,7 @@ class Engine:
         return (
             kinds(forces),
             tuple((c, c.contact, c.response) for c in self.system.colliders),
-            bool(self.system.particles.pinned.any()),
+            self.system.particles.has_pins,
             all(f.enabled for f in forces),
         )
 
@@ -486,9 +532,18 @@ def compiled_by_default() -> bool:
     return named == "compiled"
 
 
-def _taken(array: Array, rows: Rows | None) -> Array:
-    """Some rows of an array of shape (n, 3), flat: the array itself, if all are wanted."""
+def _taken(array: Array, rows: Rows | slice | None) -> Array:
+    """Some rows of an array of shape (n, 3), flat: the array itself, or a part of it, if they follow each other."""
     return array.reshape(-1) if rows is None else array[rows].reshape(-1)
+
+
+def _lines(rows: int, dtype: np.dtype[Any]) -> Array:
+    """Room for two arrays of so many rows or some more, each from the beginning of a line of memory on."""
+    rows = -(-rows // LINE) * LINE
+    size = 2 * rows * 3 * dtype.itemsize
+    space = np.empty(size + LINE, np.uint8)
+    begin = -space.ctypes.data % LINE
+    return space[begin : begin + size].view(dtype).reshape(2, rows, 3)
 
 
 def _copied(target: Array, source: Array) -> None:

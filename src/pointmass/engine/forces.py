@@ -88,10 +88,14 @@ class Deriv:
     parallel : whether its loops are those of all threads.
     implicit : whether resting contact is that of the start of a piece, and elements have blocks of a Jacobian.
     relaxed : whether springs and the like act only where the local `elastic` says so: else the solver relaxes them.
+    dealt : whether the solver relaxes those of a grid, whose state by rows is in G, with so many columns (`wide`).
     """
 
-    def __init__(self, system: ParticleSystem, parallel: bool, implicit: bool, relaxed: bool = False) -> None:
+    def __init__(
+        self, system: ParticleSystem, parallel: bool, implicit: bool, relaxed: bool = False, dealt: bool = False
+    ) -> None:
         self.system, self.parallel, self.implicit, self.relaxed = system, parallel, implicit, relaxed
+        self.dealt = dealt
         self.contact: ContactText | None = None
         if system.colliders:
             self.contact = ContactText(surfaces_of(system), system.order, implicit, str(system.particles.dtype))
@@ -110,7 +114,7 @@ class Deriv:
         """Names of the arrays of a kernel that are the same for all islands."""
         elements = [a for f in self.families for a in f.arguments]
         arrays = [*self.binder.arrays, *elements, *(a for p in self.pairs for a in p.arguments)]
-        return arrays if self.contact is None else [*arrays, "F"]
+        return [*arrays, *["F"] * (self.contact is not None), *["G", "wide"] * self.dealt]
 
     @property
     def call(self) -> str:
@@ -149,7 +153,8 @@ class Deriv:
                 self._at_time += timed
                 stages[-1] += lines
             elif isinstance(force, ElementForce):
-                stages += [self._elements(force, f"f{k}"), []]
+                lines = self._elements(force, f"f{k}")
+                stages += [lines, []] if lines else []
             elif isinstance(force, PairForce):
                 evaluate, lines = self._pairs(force)
                 before += evaluate
@@ -162,7 +167,7 @@ class Deriv:
         numbers = self.binder.numbers.lines()
         contact = "" if self.contact is None else self.contact.text
         parts = [contact, self.binder.functions, *(f"{p.text}\n\n" for p in self.pairs)]
-        if not self.families:
+        if not stages:
             loop = [f"for i in {self.loop}(n):", *indented([*PARTICLE, *ZERO, *last], 1)]
             body = [*self._at_time, *before, *loop]
         else:
@@ -239,12 +244,14 @@ class Deriv:
         ]
 
     def _elements(self, force: ElementForce, tag: str) -> list[str]:
-        """Statements that go through the elements of a tile and add what they do to its particles."""
+        """Statements that go through the elements of a tile and add what they do to its particles, if they ever do."""
         j, nodes = len(self.families) + len(self.pairs), force.nodes
         table = Table(f"L{j}")
         elastic = self.relaxed and isinstance(force, ConstraintForce)
-        coloured = elastic and self.parallel
+        coloured = elastic and self.parallel and not self.dealt
         self.families.append(Elements(force, j, table, Table(f"D{j}"), self.implicit, coloured))
+        if elastic and self.contact is None:  # only impacts ask for what is relaxed
+            return []
         state = {"t": "R(t)"}
         for node in range(nodes):
             for k, q in enumerate("xv"):

@@ -37,7 +37,8 @@ class Gradients:
     ----------
     scratch : arrays that they need -> the expressions that make them, but for those of the blocks.
     matrix : arguments that say what the matrix is.
-    calls : of `condense`, and of `gradients`, which returns the number of iterations.
+    calls : of `condense`, and of `gradients`, which returns the number of iterations, or -1 minus that if it ended in a
+        direction in which the matrix curves downwards.
 
     Parameters
     ----------
@@ -162,13 +163,13 @@ class Gradients:
             fill += self._runs(kind, [], [*lane, *adds])
         w, m = (self.deriv.binder.attribute(name, "g_") for name in "wm")
         particle = ["i = begin + l", "g_ = base + i", f"w = {w}", f"m = {m}"]
-        particle += [f"e{i}{j} = {d}" for d, (i, j) in zip(diagonal, UPPER, strict=True)]
+        particle += [f"e_{i}{j} = {d}" for d, (i, j) in zip(diagonal, UPPER, strict=True)]
         for kind in self.kinds:
-            adds = [f"e{i}{j} = e{i}{j} + {kind.name}_K[e + np.uintp({_entry(kind, i, j)})]" for i, j in UPPER]
+            adds = [f"e_{i}{j} = e_{i}{j} + {kind.name}_K[e + np.uintp({_entry(kind, i, j)})]" for i, j in UPPER]
             particle += self._rest(kind, adds if kind.relative else ["if other == i:", *indented(adds, 1)])
         if self.projected:
-            particle += [f"e{j}{i} = e{i}{j}" for i, j in UPPER if i != j]
-            particle += [*read("Q", "i", "s"), *sandwich("e")]
+            particle += [f"e_{j}{i} = e_{i}{j}" for i, j in UPPER if i != j]
+            particle += [*read("Q", "i", "s_"), *sandwich("e_")]
         particle += ["b_ = np.uintp(18 * i)"] * self.own
         for at, (i, j) in enumerate(UPPER):
             mass = "m" if i == j else "R(0)"
@@ -180,7 +181,7 @@ class Gradients:
                 particle.append(f"h{i}{j} = g * ({d}) + gg * ({a})")
                 particle.append(f"{self._at(f'h{at}')} = h{i}{j}")
                 mass = f"{mass} - h{i}{j}"
-            particle.append(f"d{i}{j} = {mass} - e{i}{j}")
+            particle.append(f"d{i}{j} = {mass} - e_{i}{j}")
         particle += inverse
         particle += [f"{d} = {out} if w != 0 else R(0)" for d, out in zip(diagonal, outputs, strict=True)]
         particle.append(f"{self._at('m')} = m if w != 0 else R(0)")
@@ -206,7 +207,7 @@ class Gradients:
             one = [f"o = np.uintp({LANES} + other)", *self._times(kind, f"{kind.name}_K", 1, str)]
             rest += self._rest(kind, one)
         if self.projected:
-            rest += [*read("Q", "(begin + l)", "s"), *times("s", ("q_x", "q_y", "q_z"), ("q_x", "q_y", "q_z"))]
+            rest += [*read("Q", "(begin + l)", "s_"), *times("s_", ("q_x", "q_y", "q_z"), ("q_x", "q_y", "q_z"))]
         rest = self._slice([*rest, *(f"{self._at(f'q_{a}')} = q_{a}" for a in "xyz")])
         if not self.projected:
             left = (f"{k.name}_ends[base + begin] < {k.name}_ends[base + begin + width]" for k in self.kinds)
@@ -264,10 +265,10 @@ class Gradients:
         if not self.projected:
             return []
         vectors = ([f"{v}[{o}]" for o in PLACE.values()] for v in "pu")
-        return [*read("Q", "i", "s"), *times("s", *vectors)]
+        return [*read("Q", "i", "s_"), *times("s_", *vectors)]
 
     def _gradients(self) -> str:
-        """The iteration; returns how often it was made."""
+        """The iteration."""
         float32 = self.deriv.binder.dtype == "float32"
         tolerance = max(self.solver.cg_tolerance, 1e-6 if float32 else 0.0)  # it cannot end below round-off
         begin = [f"o = np.uintp({LANES} + i)"]
@@ -291,10 +292,13 @@ class Gradients:
             f"    {image}",
             "    rho = eased(n, R(1), V, terms, part)",
             turn.format("R(0), R(0)"),
-            "count = 0",
+            "count, down = 0, False",
             f"while rho > goal and count < min({ConjugateGradients.restarts} * 3 * n, {ConjugateGradients.most}):",
             f"    curvature = {image}",
-            "    if curvature == 0.0:",
+            "    if not curvature > 0.0:",
+            "        if count == 0:",
+            f"            {turn.format('R(1), R(0)')}",
+            "        down = True",
             "        break",
             "    alpha = R(rho / curvature)",
             "    total = eased(n, alpha, V, terms, part)",
@@ -302,7 +306,7 @@ class Gradients:
             "    rho = total",
             "    count += 1",
             *self._blocks(self._lanes(end), summed=False),
-            "return count",
+            "return -1 - count if down else count",
         ]
         return self._function("gradients", f"{self.matrix}, guess, warm, load, dv, V, p, u, terms, part", lines)
 
@@ -333,9 +337,9 @@ def times(matrix: str, vector: Sequence[str], result: Sequence[str]) -> list[str
     return [*lines, *(f"{r} = new{i}" for i, r in enumerate(result))]
 
 
-def sandwich(name: str, right: str = "s") -> list[str]:
-    """name = s name right, of locals, in the order of `ParticleSystem.jacobian`."""
-    lines = [f"t{i}{j} = " + " + ".join(f"s{i}{k} * {name}{k}{j}" for k in AXES) for i in AXES for j in AXES]
+def sandwich(name: str, right: str = "s_") -> list[str]:
+    """name = s_ name right, of locals, in the order of `ParticleSystem.jacobian`."""
+    lines = [f"t{i}{j} = " + " + ".join(f"s_{i}{k} * {name}{k}{j}" for k in AXES) for i in AXES for j in AXES]
     return [
         *lines,
         *(f"{name}{i}{j} = " + " + ".join(f"t{i}{k} * {right}{k}{j}" for k in AXES) for i in AXES for j in AXES),

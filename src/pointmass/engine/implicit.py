@@ -1,10 +1,11 @@
 """Prints the step of an implicit solver for one island: Newton's method around conjugate gradients without a matrix.
 
-The exact Jacobian of each element is evaluated once for each iteration of Newton's method into a buffer of 3x3 blocks,
-from which `gradients` solves for the correction. An island whose elements join near rows only, a chain, is solved by
-elimination within the band of its matrix, and a particle alone by the text of `solvers.linear.three`. The operations
-are those of `solvers.newton` and `solvers.linear`, in order; where factors of a whole matrix are asked for, an island
-that is no chain says that it is not solved, and the reference path takes over.
+The Jacobian of each element is evaluated once for each iteration of Newton's method into a buffer of 3x3 blocks, from
+which `gradients` solves for the correction; again with a smaller share of what pushes, where that does not go downhill.
+An island whose elements join near rows only, a chain, is solved by elimination within the band of its matrix, and a
+particle alone by the text of `solvers.linear.three`. The operations are those of `solvers.newton` and `solvers.linear`,
+in order; where factors of a whole matrix are asked for, an island that is no chain says that it is not solved, and the
+reference path takes over.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from pointmass.laws.unary import UnaryForce
 from pointmass.solvers.bdf2 import BDF2, LARGEST_RATIO
 from pointmass.solvers.implicit import Implicit
 from pointmass.solvers.linear import traced_three
-from pointmass.solvers.newton import GROWTH, HALVINGS, ROUNDINGS
+from pointmass.solvers.newton import AGAIN, BOLD, GROWTH, HALVINGS, LEAST, LESS, MORE, ROUNDINGS, TURN
 from pointmass.tracing.columns import expanded
 from pointmass.tracing.program import Program
 from pointmass.tracing.trace import Traced, trace, vector_names
@@ -70,9 +71,11 @@ class _Printer:
         self.projected = deriv.contact is not None and deriv.order == 2  # on what contacts leave free, by Q
         self.system, self.second = deriv.system, deriv.order == 2
         self.dtype = deriv.binder.dtype
-        self.families = [_Family(deriv, f) for f in deriv.families]
+        share = "share" if solver.newton == "full" else literal(0.0, self.dtype)
+        self.families = [_Family(deriv, f, share) for f in deriv.families]
         self.kinds = _kinds(self.families)
         self.linked = bool(self.families)
+        self.searches = self.second and solver.newton == "full"  # for the place where the potential is least
         # Conjugate gradients see the symmetric part of the matrix alone, and one step of Newton's method shows that.
         self.direct = solver.linear_solver == "direct"
         auto = solver.linear_solver == "auto" and solver.newton == "full"
@@ -91,7 +94,7 @@ class _Printer:
             scratch[f"{kind.name}_K"] = f"np.empty({most}, R)"
             scratch[f"{kind.name}_R"] = f"np.empty({kind.size * LANES} * M[{len(self.families) + k + 1}], R)"
         scratch |= {"U": "np.empty(18 * M[0], R)", "part": f"np.empty(M[0] // {BLOCK} + 1)"}
-        work = ["gap", "load", "dv", "lack", "rate", "xs", "xt", "vs", "vt", "zx", "zv"]
+        work = ["gap", "load", "dv", "lack", "rate", "xs", "xt", "vs", "vt", "zx", "zv", "xh", "vh"]
         scratch |= FREE if self.projected else {}
         looks = self.deriv.binder.functions
         jacobian, own = self._jacobian()
@@ -104,18 +107,24 @@ class _Printer:
         memory = ["warm"] * self.linked + history
         state = f"{self.shared}, t, h, x, v, x1, v1, {', '.join([*scratch, *work, *memory])}, h_before, done"
         state = ", ".join(dict.fromkeys(state.split(", ")))  # blocks are among the shared ones already
-        parts = [self._largest(), jacobian]
+        parts = [self._largest(), *[self._work()] * self.searches, jacobian]
         if self.eliminates:
             parts += [
                 self._distance(),
                 self._assemble(),
-                self._function("eliminate", "rows, m, W, y", ELIMINATE.splitlines()),
+                function("eliminate", "rows, m, W, y", "**FLAGS", ELIMINATE.splitlines()),
             ]
         if self.linked and not self.direct:
             parts.append(gradients.text)
         parts.append(self._function("implicit", state, self._newton(gradients)))
+        parts.append(self._function("divided", state, self._divided(state)))
         more = self.deriv.binder.functions[len(looks) :]  # derivatives look up what laws do not
-        lines = [f"status |= implicit({state})"]
+        lines = [
+            f"bad = implicit({state})",
+            f"if bad & {NOT_SOLVED}:",
+            f"    bad = divided({state})",
+            "status |= bad",
+        ]
         functions = more + "".join(parts)
         return StepText(work, lines, 0, functions=functions, scratch=scratch, memory=memory, kinds=self.kinds)
 
@@ -138,6 +147,31 @@ class _Printer:
             "return most",
         ]
         return self._function("largest", "n, a, part", lines)
+
+    def _work(self) -> str:
+        """The sum of m a . b over the movable particles of an island."""
+        m, w = (self.deriv.binder.attribute(name, "g_") for name in "mw")
+        product = " + ".join(f"np.float64(a[o_{c}]) * np.float64(b[o_{c}])" for c in "xyz")
+        lines = [
+            *self.deriv.binder.numbers.lines(),
+            f"for block in {self.deriv.loop}((n + {BLOCK - 1}) // {BLOCK}):",
+            "    mine = 0.0",
+            f"    for i in range({BLOCK} * block, min(n, {BLOCK} * block + {BLOCK})):",
+            "        g_ = base + i",
+            *indented(_offsets(), 2),
+            f"        if {w} != 0:",
+            f"            mine = mine + np.float64({m}) * ({product})",
+            "    part[block] = mine",
+            "total = 0.0",
+            f"for block in range((n + {BLOCK - 1}) // {BLOCK}):",
+            "    total = total + part[block]",
+            "return total",
+        ]
+        return self._function("work_of", f"{self._attributes}, a, b, part", lines)
+
+    @property
+    def _attributes(self) -> str:
+        return ", ".join(["base", "n", *self.deriv.binder.arrays])
 
     # ------------------------------------------------------------------------------------------------ the Jacobian
 
@@ -170,7 +204,7 @@ class _Printer:
             "return status",
         ]
         u = ", u" * (self.linked and self.projected)
-        return self._function("jacobian", f"{self.shared}, t, g, whole, x, v, gap, U, k{u}", lines), own
+        return self._function("jacobian", f"{self.shared}, t, g, whole, share, x, v, gap, U, k{u}", lines), own
 
     def _own_blocks(self) -> tuple[list[str], list[str], bool]:
         """Statements of the time, those for particle i, and whether any of its blocks is not 0."""
@@ -195,7 +229,7 @@ class _Printer:
                 if out != literal(0.0, self.dtype):
                     lines.append(f"{q}{i}{j} = {q}{i}{j} + {out if acts is None else f'({out} if {acts} else R(0))'}")
         if self.projected and self.second:
-            lines += [*read("Q", "i", "s"), *sandwich("a"), *sandwich("b")]
+            lines += [*read("Q", "i", "s_"), *sandwich("a"), *sandwich("b")]
         lines += ["b = np.uintp(18 * i)"]
         lines += [f"U[b + np.uintp({k})] = {s}" for k, s in enumerate(sums)]
         if self.second:
@@ -203,7 +237,7 @@ class _Printer:
             for family in self.families:
                 lines += family.gather()
             if self.projected:
-                lines += times("s", ("f_x", "f_y", "f_z"), ("f_x", "f_y", "f_z"))
+                lines += times("s_", ("f_x", "f_y", "f_z"), ("f_x", "f_y", "f_z"))
             for i, a in enumerate("xyz"):
                 own = " + ".join(f"(w * a{i}{j}) * gap[o_{c}]" for j, c in enumerate("xyz"))
                 lines.append(f"k[o_{a}] = w * f_{a} + ({own})")
@@ -216,7 +250,7 @@ class _Printer:
         lines = [*self.deriv.binder.numbers.lines(), "most = 0"]
         for family in self.families:
             lines += family.distance()
-        return self._function("apart", self.shared, [*lines, "return most"])
+        return function("apart", self.shared, "**FLAGS", [*lines, "return most"])
 
     def _assemble(self) -> str:
         """M - gamma df/dv - gamma^2 df/dx as a band: entry (i, j) is W[i (3m + 1) + j - i + m]; and dv = M load."""
@@ -229,10 +263,10 @@ class _Printer:
         for family in self.families:
             lines += family.assemble()
         if self.projected:  # blocks of the particles' own forces once more, which changes nothing
-            block = [f"e{i}{c} = W[{_place(i, c, 'other')}]" for i, c in SQUARE]
-            inner = [*block, *read("Q", "other", "o"), *sandwich("e", "o")]
-            inner += [f"W[{_place(i, c, 'other')}] = e{i}{c}" for i, c in SQUARE]
-            lines += read("Q", "i", "s")
+            block = [f"e_{i}{c} = W[{_place(i, c, 'other')}]" for i, c in SQUARE]
+            inner = [*block, *read("Q", "other", "o"), *sandwich("e_", "o")]
+            inner += [f"W[{_place(i, c, 'other')}] = e_{i}{c}" for i, c in SQUARE]
+            lines += read("Q", "i", "s_")
             lines += ["for other in range(max(0, i - distance), min(n, i + distance + 1)):", *indented(inner, 1)]
         lines += [
             f"mass = {m} if {w} != 0 else R(1)",
@@ -283,14 +317,14 @@ class _Printer:
         unknown, u, trial = state[-1]
         z = f"z{unknown}"
         start = [f"g = {gamma}", f"ts = t + {solver.c!r} * h", *self._history()]
-        start += [every, *(f"    {s}[j] = {y}[j]" for y, s, _ in state)]
-        start += [*self._force("s"), every, f"    lack[j] = {u}[j] - {z}[j] - g * rate[j]"]
+        begin = [every, *(f"    {s}[j] = {y}[j]" for y, s, _ in state)]
+        begin += [*self._force("s"), every, f"    lack[j] = {u}[j] - {z}[j] - g * rate[j]"]
         if second:
-            start.append(f"    gap[j] = zx[j] + g * vs[j] - xs[j] if {free} else R(0)")
+            begin.append(f"    gap[j] = zx[j] + g * vs[j] - xs[j] if {free} else R(0)")
         jacobian_u = ", let" * (self.linked and self.projected)
         extra = "vs" if second else "xs"
         iteration = [
-            f"status |= jacobian({self.shared}, ts, g, narrow, xs, {extra}, gap, U, rate{jacobian_u})",
+            f"status |= jacobian({self.shared}, ts, g, narrow, share, xs, {extra}, gap, U, rate{jacobian_u})",
             every,
             "    load[j] = g * rate[j] - lack[j] if first else -lack[j]" if second else "    load[j] = -lack[j]",
             "size = largest(n, load, part)",
@@ -298,6 +332,7 @@ class _Printer:
             f"    return status | {NOT_SOLVED}",
             "if size > 0.0:",
             "    done[3] += 1",
+            *["definite = True"] * self.searches,
         ]
         alone = self._alone()
         if self.linked:
@@ -305,7 +340,9 @@ class _Printer:
             gradual = [
                 "    guess = first and largest(n, warm, part) != 0.0",
                 f"    {condense}",
-                f"    done[4] += {solve}",
+                f"    count = {solve}",
+                *["    definite = count >= 0"] * self.searches,
+                "    done[4] += count if count >= 0 else -1 - count",
             ]
             wide = [f"    return status | {NOT_SOLVED}"]  # factors of a whole matrix: the reference path has them
             iteration += [
@@ -330,11 +367,29 @@ class _Printer:
         ]
         accept = [every, *(f"    {s}[j] = {t}[j]" for _, s, t in state)]
         once = solver.newton == "one"
+        if self.searches:
+            iteration += [
+                f"steep = work_of({self._attributes}, load, dv, part)",
+                "if bold or share == 0 or n == 1 or size == 0.0 or (definite and steep > 0.0):",
+                "    break",
+                f"share = {literal(LESS, dtype)} * share",
+                f"share = R(0) if share < {literal(LEAST, dtype)} else share",
+            ]
+            iteration = [
+                f"if bold and k == {BOLD}:",
+                *indented([*begin, "bold, first, share = False, True, R(0)"], 1),
+                "while True:",
+                *indented(iteration, 1),
+            ]
         iteration += [
             "change = largest(n, dv, part)",
             "if not change < np.inf:",
             f"    return status | {NOT_SOLVED}",
         ]
+        short = f"now < {GROWTH!r} * size"
+        if second:
+            turned = f"work_of({self._attributes}, lack, dv, part) <= {TURN!r} * steep"
+            short = f"({short} if bold or first or not steep > 0.0 else {turned})"
         search = [
             *move,
             *self._force("t"),
@@ -343,7 +398,7 @@ class _Printer:
             "    lack[j] = gap[j] - g * rate[j]",
             "now = largest(n, lack, part)",
             f"allowed = {solver.tolerance!r} * (largest(n, {z}, part) + largest(n, gap, part))",
-            f"if now < {GROWTH!r} * size or now <= allowed:",
+            f"if now <= allowed or quiet or {short}:",
             "    break",
             "part_ = R(0.5) * part_",
         ]
@@ -359,28 +414,61 @@ class _Printer:
             iteration += [
                 "if size == 0.0:",
                 *indented([*move, *accept, "solved = True", "break"], 1),
+                "G = np.float64(g)",
+                f"quiet = {quiet}",
                 f"for _ in range({HALVINGS}):",
                 *indented(search, 1),
                 *accept,
-                "first = False",
-                "G = np.float64(g)",
-                f"if now <= allowed or {quiet}:",
+                "if now <= allowed or quiet:",
                 "    solved = True",
                 "    break",
+                f"share = {literal(MORE, dtype)} * share + {literal(AGAIN, dtype)}",
+                "share = R(1) if bold or first else min(share, R(1))",
+                "first = False",
             ]
-        loops = iteration if once else [f"for _ in range({solver.max_iterations}):", *indented(iteration, 1)]
+        loops = iteration if once else [f"for k in range({solver.max_iterations}):", *indented(iteration, 1)]
         return [
             "status = 0",
             *start,
+            *begin,
             "first = True",
             f"distance = apart({self.shared})" if self.eliminates else "distance = n",
             f"narrow = distance <= {BAND} and n <= {LONGEST}" if self.eliminates else "narrow = False",
+            "bold = narrow or n == 1" if self.searches else "bold = False",
+            "share = R(1) if bold else R(0)",
             "solved = False",
             *loops,
             "if not solved:",
             f"    return status | {NOT_SOLVED}",
             *self._end(),
             "return status",
+        ]
+
+    def _divided(self, state: str) -> list[str]:
+        """A step in halves, and those whose equations are not solved again in halves, see `Implicit.step`."""
+        columns = "xv"[: 1 + self.second]
+        every = f"for j in {self.deriv.loop}(3 * n):"
+        call = state.replace(" t, h, x, v,", " t + number * length, length, xh, vh,")
+        return [
+            every,
+            *(f"    {y}h[j] = {y}[j]" for y in columns),
+            "number, parts = 0, 2",
+            "done[2] += 1",
+            "while number < parts:",
+            "    length = h / parts",
+            f"    bad = implicit({call})",
+            f"    if bad & {NOT_SOLVED} and parts < {2**self.solver.divisions}:",
+            "        done[2] += 1",
+            "        number, parts = 2 * number, 2 * parts",
+            "        continue",
+            "    if bad != 0:",
+            "        return bad",
+            f"    {every}",
+            *(f"        {y}h[j] = {y}1[j]" for y in columns),
+            "    number += 1",
+            "    while number % 2 == 0 and number < parts:",
+            "        number, parts = number // 2, parts // 2",
+            "return 0",
         ]
 
     def _force(self, where: str) -> list[str]:
@@ -426,9 +514,11 @@ class _Family:
 
     A pair whose force depends on the differences of its ends has one block for all four, df1/dx1 = -df1/dx2 = df2/dx2,
     of which the upper triangle is kept; others have nodes x nodes blocks. All families of a kind share a buffer.
+    `share` is the local of what is counted of all that may make the matrix indefinite, see `ElementForce.softened`.
     """
 
-    def __init__(self, deriv: Deriv, elements: Elements) -> None:
+    def __init__(self, deriv: Deriv, elements: Elements, share: str) -> None:
+        self.share = share
         self.elements, self.force, self.number = elements, elements.force, elements.number
         self.nodes = self.force.nodes
         self.switch = f"if {deriv.binder.switch(self.force)} != 0:"
@@ -439,11 +529,10 @@ class _Family:
 
     def law(self, deriv: Deriv) -> Text:
         """df/dx and df/dv: entries [node, axis, of node, x or v, axis]; for a relative pair of the first end alone."""
-        traced = self.force._jacobian
+        traced = self.force.softened
         if self.relative:
-            short = Traced(self.force.name, self.force.traced.inputs, _first_outputs(self.force.traced.program, 3))
-            traced = short.jacobian(*vector_names("x1"), *vector_names("v1"))
-        state = {"t": "R(t)"}
+            traced = Traced(traced.name, traced.inputs, _first_end(traced.program))
+        state = {"t": "R(t)", "share": self.share}
         for a in range(self.nodes):
             for q in "xv":
                 state |= {n: f"{q}[n{a} + np.uintp({i})]" for i, n in enumerate(vector_names(f"{q}{a + 1}"))}
@@ -592,8 +681,9 @@ def _negative(program: Program, one: int, other: int) -> bool:
     )
 
 
-def _first_outputs(program: Program, count: int) -> Program:
-    return replace(program, outputs=program.outputs[:count])
+def _first_end(program: Program) -> Program:
+    """Of the slopes of a pair, those of the force on the first end by its own place and velocity."""
+    return replace(program, outputs=[program.outputs[12 * i + k] for i in AXES for k in range(6)])
 
 
 def _offsets() -> list[str]:
@@ -613,8 +703,8 @@ def _place(i: int, c: int, other: str) -> str:
 def _projected(matrices: str, vector: str, result: str) -> list[str]:
     """result[i] = matrices[i] vector[i]."""
     return [
-        *read(matrices, "i", "s"),
+        *read(matrices, "i", "s_"),
         *times(
-            "s", [f"{vector}[np.uintp(3 * i + {k})]" for k in AXES], [f"{result}[np.uintp(3 * i + {k})]" for k in AXES]
+            "s_", [f"{vector}[np.uintp(3 * i + {k})]" for k in AXES], [f"{result}[np.uintp(3 * i + {k})]" for k in AXES]
         ),
     ]

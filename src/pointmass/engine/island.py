@@ -18,11 +18,13 @@ from pointmass.engine import store
 from pointmass.engine.adaptive import control_text
 from pointmass.engine.blocks import Kind, Layout, layout, slices
 from pointmass.engine.contact import ContactText
+from pointmass.engine.dealt import Dealt
 from pointmass.engine.forces import LANES, Deriv, Elements, Incidence, incidence, tiled
 from pointmass.engine.impacts import WORK, ImpactText
 from pointmass.engine.implicit import implicit_text
 from pointmass.engine.pairs import FULL, PairArrays
 from pointmass.engine.phases import REACHED
+from pointmass.engine.pins import PIN_LISTS, lead_lines, maps, pin_lists
 from pointmass.engine.printing import function, indented
 from pointmass.engine.reference import KILLED
 from pointmass.engine.relaxation import relaxation_text
@@ -30,6 +32,8 @@ from pointmass.engine.steps import StepText, each, step_text
 from pointmass.engine.threads import spread
 from pointmass.laws.colouring import colour_starts
 from pointmass.laws.elements import ConstraintForce
+from pointmass.laws.stencils import Grid
+from pointmass.motions import NO_MOTIONS, Motions
 from pointmass.solvers.advance import NEARLY, SET_BACKS, Stats
 from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.control import control_of
@@ -71,6 +75,11 @@ class Span:
         """End of the last step [s]."""
         return self.time(self.count)
 
+    @property
+    def times(self) -> list[float]:
+        """The grid: begins of the steps, and the end of the last one [s]."""
+        return [self.time(k) for k in range(self.count + 1)]
+
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
@@ -100,6 +109,8 @@ class IslandKernel:
     ----------
     parallel : one large island by all threads, instead of many by one thread each.
     watched : whether it tells who hits a surface.
+    motions : of pinned particles.
+    found : the grid that the island is, if the solver relaxes it by rows.
     """
 
     def __init__(
@@ -108,11 +119,17 @@ class IslandKernel:
         solver: Solver,
         parallel: bool,
         watched: bool = False,
+        motions: Motions = NO_MOTIONS,
+        found: Grid | None = None,
     ) -> None:
         self.system, self.solver = system, solver
-        self._watched = watched
+        self._watched, self.motions = watched, motions
         self.dtype = str(system.particles.dtype)
-        self.deriv = Deriv(system, parallel, solver.implicit, isinstance(solver, XPBD))
+        self.deriv = Deriv(system, parallel, solver.implicit, isinstance(solver, XPBD), found is not None)
+        self.dealt: Dealt | None = None
+        if found is not None:
+            assert isinstance(solver, XPBD)
+            self.dealt = Dealt(found, self.dtype, bool(system.colliders), solver.iterations > 1, bool(motions))
         self.impacts = self._impacts()
         self.step = self._step_text()
         self.text = REACHED + self.functions_text + self._run()
@@ -128,10 +145,10 @@ class IslandKernel:
         if isinstance(self.solver, Implicit):
             return implicit_text(self.deriv, self.solver)
         if isinstance(self.solver, XPBD):
-            return relaxation_text(self.deriv, self.solver)
+            return relaxation_text(self.deriv, self.solver, self.dealt)
         depends = self.system.velocity_dependent
         order, loop = self.system.order, self.deriv.loop
-        steady = all(force.steady for force in self.system.forces)
+        steady = all(force.steady for force in self.system.forces) and not self.motions
         return step_text(self.solver, order, self.dtype, loop, self._w, depends, steady, self.impacts is not None)
 
     @property
@@ -272,7 +289,8 @@ class IslandKernel:
             *indented(beyond, 1),
             "return status",
         ]
-        return function("advance", self.call, deriv.once, lines)
+        loops = any("prange" in line for line in lines)
+        return function("advance", self.call, deriv.once if loops or not deriv.parallel else "**OWNING", lines)
 
     def _begin(self) -> list[str]:
         """At the beginning of a step: nobody has hit anything, and everybody is where the step began."""
@@ -313,6 +331,7 @@ class IslandKernel:
         call = self.call.replace(", x, v, ", ", xi, vi, ")
         for name in self.memory:
             call = call.replace(f", {name},", f", {name}_,")
+        around = [line.replace(", x, v", ", xi, vi") for line in self.step.around]
         alive, dead, deaths = "", [], []
         if self.deadly:  # an island of more than one particle makes single steps where somebody may die
             alive, dead = " and alive", ["alive = True"]
@@ -333,24 +352,35 @@ class IslandKernel:
             *["elastic = True"] * deriv.relaxed,
             "bad = 0",
             *dead,
+            *around[:1],
             "for s in range(count):",
+            *indented(self._lead(), 1),
             "    clock = max(t0 + (k0 + s) * dt, birth[island])",
             "    end = t0 + (k0 + s + 1) * dt",
             *indented(anew, 1),
             f"    if clock < end and bad == 0{alive}:",
             f"        bad = advance({call})",
             *indented([*deaths, *hits], 2),
+            *around[1:],
             "far, fast = reached(xi, 0, 3 * n), reached(vi, 0, 3 * n)",
             f"status[island] = bad if far < np.inf and fast < np.inf else {NOT_FINITE}",
             "reach[island, 0] = far",
             "reach[island, 1] = fast",
         ]
         layouts = [*self.step.arrays, "first_slice"] if kinds else []
-        data = ", ".join([*deriv.data, *(f"S{j}" for j in numbers), *layouts, *tiles.values()])
+        pins = [*PIN_LISTS, "pin_maps"] if self.motions else []
+        data = ", ".join([*pins, *deriv.data, *(f"S{j}" for j in numbers), *layouts, *tiles.values()])
         mortal = ["died"] * self.deadly + ["hit"] * self.watched
         grid = ", ".join([*self.memory, "birth, t0, dt, k0, count, lengths, controls, work, status, reach", *mortal])
         given = f"lo, hi, first, x, v, {data}, {grid}"
         return entry_text(self.scratch, given, ["for island in range(lo, hi):", *indented(island, 1)])
+
+    def _lead(self) -> list[str]:
+        """Put pins that move where the solver sees them in step `s`; as far as it knows they have always been there."""
+        if not self.motions:
+            return []
+        history = [("x_before_", "v_before_")] if "x_before" in self.memory else []
+        return lead_lines(len(self.motions.motions), [("xi", "vi"), *history])
 
     @property
     def title(self) -> str:
@@ -407,6 +437,10 @@ class IslandMembers:
         self.families = []
         if kernel.deriv.implicit:
             self.families = [self._family(f, *e) for f, e in zip(kernel.deriv.families, elements, strict=True)]
+        ordered = zip(kernel.deriv.families, self.families, strict=bool(self.families))
+        self.colours = [
+            colour_starts(self._colours(f, mine) if f.coloured else self.rows[:0]) for f, (mine, _) in ordered
+        ]
         places = [self.place[nodes] for _, nodes in elements]
         self.tiling = self._tiling(places) if kernel.deriv.parallel else self.first
         first = 0 * self.tiling[:-1] if kernel.deriv.parallel else self.first[:-1]
@@ -417,6 +451,7 @@ class IslandMembers:
             for (mine, _), t in zip(elements, self.tiles, strict=True)
         ]
         self.layouts = [self._layout(kind) for kind in kernel.step.kinds]
+        self.pins = pin_lists(kernel.motions, kernel.system.particles, self.place, self.first) if kernel.motions else []
 
     def _elements(self, force: Any) -> tuple[Rows, Rows]:
         """Numbers and particles of the elements of a force that are in the group."""
@@ -438,8 +473,7 @@ class IslandMembers:
 
     def _colours(self, family: Elements, elements: Rows) -> Rows:
         """Colours of some elements, by their numbers."""
-        assert isinstance(family.force, ConstraintForce)
-        return family.force.colours(self.kernel.system.particles)[elements]
+        return self.kernel.system.colours[family.force][elements]
 
     def _layout(self, kind: Kind) -> Layout:
         """Where the blocks of a matrix are."""
@@ -466,7 +500,6 @@ class IslandMembers:
         deriv, count, islands = self.kernel.deriv, len(self.rows), len(self.islands)
         dtype = self.kernel.system.particles.dtype
         data = deriv.binder.data(count, self.order)
-        contact = [] if deriv.contact is None else [deriv.contact.table()]
         died, hit = np.zeros(count, np.uint8), np.zeros(count * self.kernel.watched, np.uint8)
         starts, most = [], [int(np.diff(self.first).max(initial=0))]
         for k, family in enumerate(deriv.families):
@@ -474,7 +507,7 @@ class IslandMembers:
             if deriv.implicit:
                 elements, found = self.families[k]
                 data += [found.nodes, family.table.array(len(elements), dtype, elements), found.ends, found.entries]
-                data += [colour_starts(self._colours(family, elements))] if family.coloured else []
+                data += [self.colours[k]] if family.coloured else []
                 starts.append(found.start)
                 most.append(int(np.diff(found.start).max(initial=0)))
         for pairs in self.pairs:
@@ -500,8 +533,10 @@ class IslandMembers:
             self.first,
             x,
             v,
+            *self.pins,
+            *([maps(self.kernel.motions, span.times, dtype)] if self.pins else []),
             *data,
-            *contact,
+            *self._more(),
             *starts,
             *layouts,
             *(t.start for t in self.tiles),
@@ -535,6 +570,12 @@ class IslandMembers:
         again = bool((status == FULL).any())
         told = self.rows[died > 0], self.rows[marked(self.kernel.deriv.contact, hit)]
         return Outcome(not status.any(), reach.max(axis=0), stats, again, *told)
+
+    def _more(self) -> list[Any]:
+        """Colliders now, and the rows of a grid."""
+        contact, dealt = self.kernel.deriv.contact, self.kernel.dealt
+        surfaces: list[Any] = [] if contact is None else [contact.table()]
+        return surfaces + ([] if dealt is None else dealt.arrays(self.kernel.system.particles.w))
 
     def _view(self, memory: Memory, name: str, part: int) -> Array:
         """The part of a memory entry that belongs to x or to v, shape (n, 3)."""

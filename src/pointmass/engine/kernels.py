@@ -25,6 +25,14 @@ def _grow_old() -> Any:
     def grow(age: Any, lived: Any, lo: int, hi: int) -> None:
         for start in range(lo, hi, BLOCK):
             some = age[start : min(start + BLOCK, hi)]
+            first, same = some[0], True
+            for i in range(len(some)):
+                same &= some[np.uintp(i)] == first
+            if same:  # those of one age stay so
+                for k in range(len(lived)):
+                    first += lived[k]
+                some[:] = first
+                continue
             many = len(lived) // 4 * 4
             for k in range(0, many, 4):  # four for each visit to the cache
                 a, b, c, d = lived[k], lived[k + 1], lived[k + 2], lived[k + 3]

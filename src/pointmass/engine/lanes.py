@@ -23,10 +23,12 @@ from pointmass.engine.binding import Binder, Packed, Table
 from pointmass.engine.forces import tiled, unary
 from pointmass.engine.island import NOT_FINITE, Array, Outcome, Rows, Span
 from pointmass.engine.phases import REACHED, STATE, entries, phases, regions, simple
+from pointmass.engine.pins import MAP, maps, put
 from pointmass.engine.printing import indented
 from pointmass.engine.threads import spread
 from pointmass.laws.elements import ElementForce
 from pointmass.laws.unary import UnaryForce
+from pointmass.motions import NO_MOTIONS, Motions
 from pointmass.solvers.advance import Stats
 from pointmass.solvers.base import Memory, Solver
 from pointmass.system import ParticleSystem
@@ -171,8 +173,10 @@ class LanesKernel:
     Forces on elements that are switched off are left out, so another kernel is needed when they are switched on.
     """
 
-    def __init__(self, system: ParticleSystem, solver: Solver, topology: Topology) -> None:
-        self.system, self.solver, self.families = system, solver, topology.families
+    def __init__(
+        self, system: ParticleSystem, solver: Solver, topology: Topology, motions: Motions = NO_MOTIONS
+    ) -> None:
+        self.system, self.solver, self.families, self.motions = system, solver, topology.families, motions
         self.dtype = str(system.particles.dtype)
         self.nodes = topology.rows.shape[1]
         self.apart = self.nodes | 1  # rows between components: multiples of 4096 bytes would collide in the cache
@@ -182,14 +186,16 @@ class LanesKernel:
             self.scratch.block(name, 3 * self.apart)
         self.binder = Binder(system.particles, Columns("C", self.nodes, self.scratch))
         self.tables = [Columns(f"D{j}", len(f.nodes), self.scratch) for j, f in enumerate(self.families)]
+        self.led = np.flatnonzero(np.isin(topology.rows, motions.led(system.particles).rows).any(axis=0))
+        self.arms = Columns("M", len(self.led), self.scratch)
         self.staged: set[int] = set()  # numbers of the families that are a loop
         self._at_time: list[str] = []
-        deriv = self._deriv()
+        deriv, lead = self._deriv(), self._lead()
         width = [w for w in WIDTHS if self.scratch.rows * w * system.particles.dtype.itemsize <= ROOM]
         self.width = WIDTHS[0] if self.staged else width[0] if width else WIDTHS[-1]
         constants = [f"L = {self.width}", f"N = {self.nodes}", f"A = {self.apart}", "", "", ""]
         parts = ["\n".join(constants), self.binder.functions, REACHED, *MOVED]
-        self.text = "".join([*parts, "\n".join([*deriv, *self._step(), *self._run()])])
+        self.text = "".join([*parts, "\n".join([*deriv, *lead, *self._step(), *self._run()])])
 
     @staticmethod
     def fits(system: ParticleSystem, solver: Solver) -> bool:
@@ -215,7 +221,7 @@ class LanesKernel:
         """Tables of all columns in the scratch."""
         particle = self.binder.particle
         assert isinstance(particle, Columns)
-        return [particle, *self.tables]
+        return [particle, *self.tables, self.arms]
 
     # ---------------------------------------------------------------------------------------- text
 
@@ -323,6 +329,22 @@ class LanesKernel:
             *indented(take, 1),
         ]
 
+    def _lead(self) -> list[str]:
+        """The function that puts pins that move where the solver sees them in a step, whose maps begin at `o`."""
+        if not len(self.led):
+            return []
+        lines = []
+        for run in runs(np.asarray(self.led[:, None], np.int32)):
+            places = {
+                f"{name} {axis}": f"s[({self._place(name, a) + run.nodes[0]} + {run.strides[0]} * e) * L + i]"
+                for name in self.scratch.places
+                if name in ("X", "V", "X0", "V0")
+                for a, axis in enumerate(AXES)
+            }
+            lines += [f"for e in range({run.count}):", "    for i in range(L):"]
+            lines += indented(put(self.motions, self.system.particles, self.arms, f"{run.begin} + e", places), 2)
+        return ["@njit(**FLAGS)", "def lead(s, pin_maps, o):", *indented(lines, 1), "", ""]
+
     def _step(self) -> list[str]:
         """The functions of the phases, and the one that calls them in turn."""
         functions, calls = [], []
@@ -358,9 +380,15 @@ class LanesKernel:
                 f"        for i in range({length} * L):",
                 f"            s[{row} * L + i] = K[o + i]",
             ]
+        given, lead = self._shared(), []
+        if len(self.led):
+            given, lead = (
+                f"{given}, pin_maps",
+                [f"            lead(s, pin_maps, (k - k0) * {MAP * len(self.motions.motions)})"],
+            )
         return [
             "@njit(**OWNING_ENTRY)",
-            f"def run(first, last, islands, x, v, {self._shared()}, K, O, t0, dt, k0, count, status, reach):",
+            f"def run(first, last, islands, x, v, {given}, K, O, t0, dt, k0, count, status, reach):",
             f"    s = np.zeros({self.scratch.rows} * L, R)",
             "    g = np.empty(STAGE * L, R)",
             "    for tile in range(first, last):",
@@ -370,6 +398,7 @@ class LanesKernel:
             *fill,
             "        bad = 0",
             "        for k in range(k0, k0 + count):",
+            *lead,
             "            t = t0 + k * dt",
             f"            bad |= step(s, g, {self._shared()}, t, t0 + (k + 1) * dt - t)",
             "        far, fast = reached(s, 0, 3 * A * L), reached(s, 3 * A * L, 6 * A * L)",
@@ -418,14 +447,15 @@ class LanesMembers:
 
     def __init__(self, kernel: LanesKernel, topology: Topology) -> None:
         self.kernel, self.islands = kernel, len(topology.rows)
-        orders = [topology.rows, *(f.own for f in topology.families)]
+        orders = [topology.rows, *(f.own for f in topology.families), topology.rows[:, kernel.led]]
         self._columns = Packed(kernel.columns(), orders, kernel.dtype, self._tiles)
 
     def run(self, x: Array, v: Array, births: Array | None, span: Span, memory: Memory) -> Outcome:
         """Advance positions and velocities, shape (3 * rows,), in place."""
         kernel = self.kernel
         elements = [np.ascontiguousarray(kernel.families[j].nodes).ravel() for j in sorted(kernel.staged)]
-        data = (*kernel.binder.common(), *elements, *self._columns.arrays())
+        places = [maps(kernel.motions, span.times, kernel.dtype)] if len(kernel.led) else []
+        data = (*kernel.binder.common(), *elements, *places, *self._columns.arrays())
         tiles = -(-self.islands // kernel.width)
         status, reach = np.zeros(tiles, np.int64), np.zeros((tiles, 2), x.dtype)
         grid = (span.t0, span.dt, span.first, span.count)

@@ -21,18 +21,20 @@ from pointmass.engine.binding import Binder, Packed, Table
 from pointmass.engine.forces import different, unary
 from pointmass.engine.island import Array, Outcome, Rows, Span
 from pointmass.engine.phases import REACHED, STATE, entries, phases, regions, simple
+from pointmass.engine.pins import MAP, maps, put
 from pointmass.engine.printing import indented
 from pointmass.engine.threads import spread
+from pointmass.laws import stencils
 from pointmass.laws.elements import ElementForce
+from pointmass.laws.stencils import SMALLEST, Grid
 from pointmass.laws.unary import UnaryForce
+from pointmass.motions import NO_MOTIONS, Motions
 from pointmass.solvers.advance import Stats
 from pointmass.solvers.base import Memory, Solver
 from pointmass.system import ParticleSystem
 from pointmass.tracing.trace import vector_names
 
 AXES = "xyz"
-FARTHEST = 4  # rows or columns between the nodes of an element
-SMALLEST = 16  # rows and columns of a grid that is worth tiles
 WIDTHS = (64, 128, 256)  # columns of a tile
 HEIGHT = 64  # rows of a tile, at most
 STEPS = 4  # steps in one pass, at most
@@ -41,80 +43,10 @@ GRAIN = 32  # rows that are worth a thread
 PAD = 8  # the halo has a multiple of so many columns
 
 
-@dataclass(frozen=True, eq=False)
-class Stencil:
-    """Elements of a force that are shifts of each other over the whole grid.
-
-    Attributes
-    ----------
-    shifts : (row, column) of each node, seen from the corner of the element's box.
-    own : number in the force of the element at each corner, shape (m - rows, n - columns).
-    """
-
-    force: ElementForce
-    shifts: tuple[tuple[int, int], ...]
-    own: Rows
-
-    @property
-    def box(self) -> tuple[int, int]:
-        """Rows and columns between the first and the last node."""
-        return max(r for r, _ in self.shifts), max(c for _, c in self.shifts)
-
-
-@dataclass(frozen=True, eq=False)
-class Grid:
-    """An island as a grid of m x n particles, row by row."""
-
-    members: Rows
-    m: int
-    n: int
-    stencils: list[Stencil]
-
-
 def grid(system: ParticleSystem, members: Rows) -> Grid | None:
     """The grid that an island is, if it is one; `members` are its particles, row by row."""
-    place = np.full(len(system.particles), -1, np.intp)
-    place[members] = np.arange(len(members))
-    found = []
-    for force in system.forces:
-        if isinstance(force, ElementForce) and force.enabled:
-            rows = force.rows(system.particles)
-            mine = np.flatnonzero(place[rows[:, 0]] >= 0)
-            if len(mine):  # others are those of other islands
-                found.append((force, place[rows[mine]], mine))
-    distances = [np.unique(abs(nodes[:, 1:] - nodes[:, :1])) for _, nodes, _ in found]
-    if not distances or max(map(len, distances)) > 4 * FARTHEST**2:
-        return None
-    near = {(int(d) + k) // r for d in np.concatenate(distances) for k in (-1, 0, 1) for r in range(1, FARTHEST + 1)}
-    for n in sorted(near):
-        m = len(members) // n if n >= SMALLEST else 0
-        if m >= SMALLEST and m * n == len(members):
-            stencils = _stencils(found, m, n)
-            if stencils is not None:
-                return Grid(members, m, n, stencils)
-    return None
-
-
-def _stencils(found: list[tuple[ElementForce, Rows, Rows]], m: int, n: int) -> list[Stencil] | None:
-    """The elements as stencils that cover the whole of a grid of a given width; None if they do not."""
-    result = []
-    for force, nodes, own in found:
-        rows, columns = nodes // n, nodes % n
-        top, left = rows.min(axis=1), columns.min(axis=1)
-        shifts = np.stack([rows - top[:, None], columns - left[:, None]], axis=2)
-        if shifts.max(initial=0) > FARTHEST:
-            return None
-        kinds, which = np.unique(shifts.reshape(len(nodes), -1), axis=0, return_inverse=True)
-        for k, kind in enumerate(kinds):
-            stencil = tuple((int(r), int(c)) for r, c in kind.reshape(-1, 2))
-            box = np.max(stencil, axis=0)
-            mine = np.flatnonzero(which.ravel() == k)
-            corners = np.full((m - box[0], n - box[1]), -1, np.intp)
-            corners[top[mine], left[mine]] = own[mine]
-            if len(mine) != corners.size or (corners < 0).any():
-                return None
-            result.append(Stencil(force, stencil, corners))
-    return result
+    forces = [force for force in system.forces if isinstance(force, ElementForce) and force.enabled]
+    return stencils.grid(forces, system.particles, members)
 
 
 @dataclass
@@ -167,8 +99,9 @@ class LatticeKernel:
     pad : columns of the halo on either side.
     """
 
-    def __init__(self, system: ParticleSystem, solver: Solver, found: Grid) -> None:
-        self.system, self.solver, self.grid = system, solver, found
+    def __init__(self, system: ParticleSystem, solver: Solver, found: Grid, motions: Motions = NO_MOTIONS) -> None:
+        self.system, self.solver, self.grid, self.motions = system, solver, found, motions
+        self.leads = bool(np.isin(found.members, motions.led(system.particles).rows).any())
         self.dtype = str(system.particles.dtype)
         self.phases = phases(solver, self.dtype, system.velocity_dependent)
         boxes = [s.box for s in found.stencils]
@@ -186,7 +119,7 @@ class LatticeKernel:
         self.binder = Binder(system.particles, Columns("C", self.row))
         self.tables = [Columns(f"D{k}", self.row) for k in range(len(found.stencils))]
         self.slots = 0  # numbers of all stencils at one corner
-        row = self._row()
+        row = [*self._row(), *self._lead()]
         parts = ["\n".join(self._constants()), self.binder.functions, REACHED]
         self.text = "".join([*parts, "\n".join([*row, *self._phases(), *self._tile(), *self._run()])])
 
@@ -279,6 +212,10 @@ class LatticeKernel:
         """Arrays that all particles share: numbers and grids."""
         return ", ".join(name for name in self.binder.arrays if name != self.binder.particle.name)
 
+    def _given(self) -> str:
+        """The same, and what tells where pins that move are: rows that have any, maps of the steps from `k0` on."""
+        return self._shared() + ", led, pin_maps, k0" * self.leads
+
     def _rings(self) -> str:
         """Names of the forces of the elements with their corner in this row, in the one before, ..."""
         return ", ".join(f"z{d}" for d in range(self.reach + 1))
@@ -324,6 +261,22 @@ class LatticeKernel:
                     entry = f"z{dr}[{slot + term[0]} * WIDTH + PAD - {dc} + i]"
                     terms.append((int(middle), f"f_{a} = f_{a} {term[1]} {entry}"))
         return lines, text.at_time, terms
+
+    def _lead(self) -> list[str]:
+        """The function that puts pins that move where the solver sees them in a step, for a row; maps from `o` on."""
+        if not self.leads:
+            return []
+        regions = [name for name in ("X", "V", "X0", "V0") if f"{name} x" in self.row.places]
+        places = {f"{name} {axis}": self._state(name, a) for name in regions for a, axis in enumerate(AXES)}
+        lines = put(self.motions, self.system.particles, self.binder.particle, "", places)
+        return [
+            "@njit(**FLAGS)",
+            "def lead(q, pin_maps, o):",
+            "    for i in range(WIDTH):",
+            *indented(lines, 2),
+            "",
+            "",
+        ]
 
     def _phases(self) -> list[str]:
         """The functions of the phases for a row."""
@@ -386,6 +339,14 @@ class LatticeKernel:
             f"keep(s, o + {place} * WIDTH + PAD, Z, ({j} * m + r) * n + left + PAD, min(INNER, n - left - PAD))"
             for j, place in enumerate(self.state)
         ]
+        lead = []
+        if self.leads:
+            lead = [
+                "for r in range(lo, hi):",
+                "    if led[r] != 0:",
+                "        q = s[HEAD + (r - top) * ROW : HEAD + (r - top + 1) * ROW]",
+                f"        lead(q, pin_maps, (now - k0) * {MAP * len(self.motions.motions)})",
+            ]
         return [
             "@njit(**FLAGS)",
             "def bring(s, offset, Y, row, left, n):",
@@ -410,7 +371,7 @@ class LatticeKernel:
             "",
             "",
             "@njit(**FLAGS)",
-            f"def tile(s, Y, Z, {self._shared()}, K, O, upper, lower, column, m, n, t0, dt, k, steps):",
+            f"def tile(s, Y, Z, {self._given()}, K, O, upper, lower, column, m, n, t0, dt, k, steps):",
             "    left = column * INNER - PAD",
             f"    top = max(0, upper - {halo} * steps)",
             f"    bottom = min(m, lower + {halo} * steps)",
@@ -428,6 +389,7 @@ class LatticeKernel:
             "        t = t0 + now * dt",
             "        h = t0 + (now + 1) * dt - t",
             "        hr = R(h)",
+            *indented(lead, 2),
             *indented(self._sweeps(), 2),
             "    for r in range(upper, lower):",
             "        o = HEAD + (r - top) * ROW",
@@ -438,7 +400,7 @@ class LatticeKernel:
         ]
 
     def _run(self) -> list[str]:
-        shared = self._shared()
+        shared = self._given()
         return f'''@njit(parallel=True, **OWNING_ENTRY)
 def sweep(Y, Z, work, {shared}, K, O, height, m, n, t0, dt, k, steps, status):
     wide = (n + INNER - 1) // INNER
@@ -485,6 +447,10 @@ class LatticeMembers:
         size = 6 * found.m * found.n
         self._state = np.empty(size, kernel.dtype), np.empty(size, kernel.dtype)
         self._work: NDArray[Any] | None = None
+        self._led: list[NDArray[Any]] = []
+        if kernel.leads:
+            rows = np.flatnonzero(np.isin(found.members, kernel.motions.led(kernel.system.particles).rows)) // found.n
+            self._led = [np.isin(np.arange(found.m), rows).astype(np.int64)]
 
     def run(self, x: Array, v: Array, births: Array | None, span: Span, memory: Memory) -> Outcome:
         """Advance positions and velocities, shape (3 * rows,), in place."""
@@ -493,7 +459,10 @@ class LatticeMembers:
         height, work = self._tiles()
         status, reach = np.zeros(len(work), np.int64), np.zeros((m, 2), x.dtype)
         here, there = self._state
-        data = (work, *kernel.binder.common(), *self._columns.arrays(), height, m, n, span.t0, span.dt)
+        pins: tuple[Any, ...] = ()
+        if kernel.leads:
+            pins = (*self._led, maps(kernel.motions, span.times, kernel.dtype), span.first)
+        data = (work, *kernel.binder.common(), *pins, *self._columns.arrays(), height, m, n, span.t0, span.dt)
         spread(lambda lo, hi: apart(lo, hi, x, v, here, m, n), m, GRAIN)
         for k in range(span.first, span.first + span.count, kernel.most):
             sweep(here, there, *data, k, min(kernel.most, span.first + span.count - k), status)

@@ -2,7 +2,8 @@
 
 `NAME_look` does what `look` of the surface does to one point: it returns the signed distance and the normal. It may
 remember, in the scratch array C from m on, what saves time at the next point and changes nothing; at first that is 0.
-`NAME_bound(P, k, x, y, z)` returns a lower bound of the distance, at once.
+`NAME_bound(P, k, x, y, z)` returns a lower bound of the distance, at once; and `NAME_apart` one that is above 0 only
+for places beyond all data, by arithmetic alone, so that a loop over lanes is one of vectors.
 """
 
 from __future__ import annotations

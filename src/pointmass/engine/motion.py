@@ -20,6 +20,7 @@ from pointmass.system import ParticleSystem
 LANE = "i"  # index of a lane
 STATE = 7  # rows of the scratch before the columns: x, v, and who waits
 W = 256  # lanes of a tile
+ONCE = "forceinline=True, **FLAGS"  # of what is called in one place: each array is seven arguments of a call
 AXES = "xyz"
 
 
@@ -48,7 +49,7 @@ class Motion:
         self.dtype = binder.dtype
         self.at_time: list[str] = []
         self.lines: list[str] = [f"w = {self.binder.attribute('w', LANE)}"]
-        self.pins = bool(system.particles.pinned.any())
+        self.pins = system.particles.has_pins
         if self.pins:
             self.lines.append("free = w != 0")
         self.timed = False  # whether the laws depend on time
@@ -96,8 +97,11 @@ class Motion:
 
     def watched(self, clear: ClearLines) -> list[str]:
         """Statements that look whether a step comes near a surface."""
-        third = f"third = hr * {literal(1 / 3, self.dtype)}"
-        return [third, *self.path(0), *self.path(1), *clear.lane]
+        return [*self.path(0), *self.path(1), *clear.lane]
+
+    def third(self, length: str) -> str:
+        """The statement that gives `ClearLines` the length of the longest step."""
+        return f"third = {length} * {literal(1 / 3, self.dtype)}"
 
     def _free(self, value: str) -> str:
         """A value that is 0 for pinned particles."""
@@ -171,7 +175,7 @@ class Pulled(Motion):
     def __init__(self, system: ParticleSystem, solver: Solver, binder: Binder) -> None:
         self.contact: ContactText | None = None
         if system.colliders:
-            self.contact = ContactText(surfaces_of(system), system.order, False, binder.dtype)
+            self.contact = ContactText(surfaces_of(system), system.order, False, binder.dtype, ONCE)
         super().__init__(system, solver, binder)
         self.text = self._pull()
 
@@ -264,8 +268,10 @@ class Flight:
                 *["t0 = began"] * bool(clear.step),
                 *trial,
                 *clear.step,
+                motion.third("hr"),
                 *motion.path(0),
                 *clear.begin,
+                *clear.looks,
                 *motion.watched(clear),
                 *clear.end,
                 f"if {pinned}({clear.result}):",
@@ -288,7 +294,7 @@ class Flight:
         ]
         doc = '"""Some steps, from impact to impact; a status, and the most impacts that there were in one of them."""'
         given = ", ".join([LANE, *self.arrays, "start, dt, first, last, birth"])
-        return function("fly", given, "**FLAGS", [doc, *binder.numbers.lines(), *lines])
+        return function("fly", given, ONCE, [doc, *binder.numbers.lines(), *lines])
 
     def _pieces(self) -> list[str]:
         """A step that is not clear: `_prepare` of ReferenceEngine, the solver's trial and `_collide`, in turns."""

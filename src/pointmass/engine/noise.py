@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from pointmass.engine.printing import function, statements
 from pointmass.tracing.columns import expanded
-from pointmass.tracing.noise import Function
+from pointmass.tracing.program import Function
 
 
 def function_of(primitives: Sequence[Function], name: str, dtype: str) -> str:

@@ -42,7 +42,9 @@ class Pairs:
     ----------
     text : its functions; the one to call is `pairs{number}`.
     arguments : arrays of the kernel that belong to it (`PairArrays.arrays`): H (rows), W (work), F (forces of all rows,
-        shape (3 n,)); within a cut-off also K (head), L (cells), N (neighbours), X (positions when these were found).
+        shape (3 n,)); within a cut-off also K (head), L (cells), N (neighbours), X (positions when these were found);
+        where not all act on all A: H begins with those that are acted on, A[1] of them, and ends with those that act,
+        from A[0] on.
     locals : what a call for one island takes besides, its range s, e in H.
     """
 
@@ -52,7 +54,9 @@ class Pairs:
         self.flags = "parallel=True, **OWNING" if parallel else "**OWNING"
         self.tile = TILES[parallel]
         self.near = force.reach(binder.particles) is not None
-        self.arguments = [f"{a}{number}" for a in ("HWFKLNX" if self.near else "HWF")]
+        self.one_way = force.by is not None
+        self.arguments = [f"{a}{number}" for a in "HWF" + "KLNX" * self.near + "A" * self.one_way]
+        self.begin, self.acted = ("A[0]", "A[1]") if self.one_way else ("0", "m")
         self.locals = [f"s{number}", f"e{number}"]
         self._law = _Law(force, f"f{number}", binder, self.near)
         self.quantities = len(self._law.quantities)
@@ -80,7 +84,7 @@ class Pairs:
             f"for i in {loop}(n):",
             "    g = H[s + min(np.int64(i), m - 1)]",
             *indented(self._law.copies("i"), 1),
-            *(self._tiles_of_two() if loop == "prange" else self._tile_by_tile()),
+            *(self._tiles_of_two() if loop == "prange" and not self.one_way else self._tile_by_tile()),
             "return status",
         ]
         return "\n".join([*self._head(), *indented(body, 1), ""])
@@ -123,7 +127,7 @@ class Pairs:
             f"total = np.zeros({law.sums * size})",
             f"for l in range({size}):",
             *(f"    {lanes[q]} = {law.entry(q, 'lo + l')}" for q in law.first),
-            f"for block in range(0, m, {BLOCK}):",
+            f"for block in range({self.begin}, m, {BLOCK}):",
             f"    end = min(block + {BLOCK}, m)",
             f"    for l in range({law.sums * size}):",
             f"        z[{sums[0]} + l] = R(0)",
@@ -133,11 +137,11 @@ class Pairs:
             *indented(plain, 2),
             f"    for l in range({law.sums * size}):",
             f"        total[l] = total[l] + z[{sums[0]} + l]",
-            f"for l in range(min({size}, m - lo)):",
+            f"for l in range(min({size}, {self.acted} - lo)):",
             *(f"    sum{k} = R(total[{k * size} + l])" for k in range(law.sums)),
             *indented(law.result("H[s + lo + l]", "lo + l"), 1),
         ]
-        return [f"for tile in range(n // {size}):", *indented(tile, 1)]
+        return [f"for tile in {self.loop}(({self.acted} + {size - 1}) // {size}):", *indented(tile, 1)]
 
     def _tiles_of_two(self) -> list[str]:
         """Every pair once, for both: teams of tiles meet as in a tournament, so that no two threads add to one tile.
@@ -273,7 +277,8 @@ class Pairs:
             "        moved = 1",
             f"K[{HEAD} + chunk] = moved",
         ]
-        build = f"build{j}({', '.join(['base', 's', 'e', reach, *sides, 'H', 'W', 'K', 'L', 'N', 'X', 'x'])})"
+        given = ["base", "s", "e", reach, *sides, *"HWKLNX", *"A" * self.one_way, "x"]
+        build = f"build{j}({', '.join(given)})"
         body = [
             f"cut2 = {reach} * {reach}",
             f"slack2 = R({0.5 * SKIN} * {0.5 * SKIN}) * cut2",
@@ -297,10 +302,10 @@ class Pairs:
             "            K[0] = 0",
             "    if K[0] != 0:",
             "        break",
-            f"for chunk in {loop}((m + {CHUNK - 1}) // {CHUNK}):",
+            f"for chunk in {loop}(({self.acted} + {CHUNK - 1}) // {CHUNK}):",
             f"    y = np.empty({(4 + len(more)) * PIECE}, R)",
             f"    z = np.empty({law.sums * step}, R)",
-            f"    for r in range(np.int64(chunk) * {CHUNK}, min(m, (np.int64(chunk) + 1) * {CHUNK})):",
+            f"    for r in range(np.int64(chunk) * {CHUNK}, min({self.acted}, (np.int64(chunk) + 1) * {CHUNK})):",
             *indented(particle, 2),
             "return status",
         ]
@@ -313,11 +318,12 @@ class Pairs:
         record is a particle or an image of one, sorted; `top` is how many there is room for. Stretches of L, each of
         this length: particle of a record, neighbours of a particle (by its place among the sorted ones), its record,
         cell of a record not yet sorted, the order, particle of a record not yet sorted (less m: an image); then the
-        begins of the cells. X has positions when the list was made, and by how much images were moved, in both orders.
+        begins of the cells; who does not act is in another cell, where nobody looks. X has positions when the list was
+        made, and by how much images were moved, in both orders.
         """
         law, loop = self._law, self.loop
         sides = ["side0", "side1", "side2"] if periodic else []
-        names = ["base", "s", "e", "reach", *sides, "H", "W", "K", "L", "N", "X", "x"]
+        names = ["base", "s", "e", "reach", *sides, *"HWKLNX", *"A" * self.one_way, "x"]
         found = [
             *(f"low{a} = min(low{a}, np.float64(u{a}))" for a in range(3)),
             *(f"high{a} = max(high{a}, np.float64(u{a}))" for a in range(3)),
@@ -359,6 +365,8 @@ class Pairs:
                 f"c{a} = max(0, min(n{a} - 1, np.int64(u - n{a} * np.floor(u / n{a}))))",
             ]
         place.append("L[3 * top + q] = (c2 * n1 + c1) * n0 + c0")
+        if self.one_way:
+            place.append("L[3 * top + q] += cells if (i if i >= 0 else i + m) < A[0] else 0")
         stretch = [
             "for row in range(h1 * h2):",
             "    r1 = (c1 + row % h1 - g1) % n1",
@@ -378,9 +386,9 @@ class Pairs:
         ]
         each = [
             "known = np.int64(-1)",
-            f"for r in range(np.int64(chunk) * {CHUNK}, min(m, (np.int64(chunk) + 1) * {CHUNK})):",
+            f"for r in range(np.int64(chunk) * {CHUNK}, min({self.acted}, (np.int64(chunk) + 1) * {CHUNK})):",
             "    k = np.int64(L[2 * top + r])",
-            "    c = np.int64(L[3 * top + L[4 * top + k]])",
+            f"    c = np.int64(L[3 * top + L[4 * top + k]]){' % cells' * self.one_way}",
             "    if c != known:",
             "        known = c",
             "        c0 = c % n0",
@@ -442,16 +450,17 @@ class Pairs:
             *indented(images, 1),
             "K[4] = total",
             *counts,
-            "while n0 * n1 * n2 > 4 * total + 27:",
+            f"while n0 * n1 * n2 > {2 if self.one_way else 4} * total + {13 if self.one_way else 27}:",
             "    if n0 >= n1 and n0 >= n2:",
             "        n0 = (n0 + 1) // 2",
             "    elif n1 >= n2:",
             "        n1 = (n1 + 1) // 2",
             "    else:",
             "        n2 = (n2 + 1) // 2",
+            "cells = n0 * n1 * n2",
             f"for q in {loop}(total):",
             *indented(place, 1),
-            "cells = n0 * n1 * n2",
+            *["cells *= 2"] * self.one_way,
             "for c in range(cells + 1):",
             "    L[6 * top + c] = 0",
             "for q in range(total):",
@@ -468,9 +477,10 @@ class Pairs:
             "for c in range(cells, 0, -1):",
             "    L[6 * top + c] = L[6 * top + c - 1]",
             "L[6 * top] = 0",
+            *["cells = n0 * n1 * n2"] * self.one_way,
             "r = 0",
             "for k in range(total):",
-            "    if L[5 * top + L[4 * top + k]] >= 0:",
+            f"    if {'A[1] > ' * self.one_way}L[5 * top + L[4 * top + k]] >= 0:",
             "        L[2 * top + r] = k",
             "        r += 1",
             f"for k in {loop}(total):",
@@ -487,10 +497,10 @@ class Pairs:
             "h2 = min(n2, 3)",
             "g1 = 1 if n1 > 2 else 0",
             "g2 = 1 if n2 > 2 else 0",
-            f"for chunk in {loop}((m + {CHUNK - 1}) // {CHUNK}):",
+            f"for chunk in {loop}(({self.acted} + {CHUNK - 1}) // {CHUNK}):",
             *indented(search, 1),
             "most = 0",
-            "for r in range(m):",
+            f"for r in range({self.acted}):",
             "    most = max(most, L[top + r])",
             "K[2] = most",
             "if most >= room:",
@@ -614,8 +624,7 @@ class PairArrays:
 
     def __init__(self, pairs: Pairs, particles: Particles, place: Rows) -> None:
         self.pairs, self.particles = pairs, particles
-        rows = place[particles.select(pairs.force.on)]
-        self.rows = rows[rows >= 0].astype(np.int64)
+        self.rows, self._split = _rows(pairs.force, particles, place)
         count, dtype = len(self.rows), particles.dtype
         self._forces = np.zeros(3 * (int(place.max(initial=-1)) + 1), dtype)
         self._work = np.empty(pairs.quantities * -(-count // pairs.tile) * pairs.tile * (not pairs.near), dtype)
@@ -625,8 +634,9 @@ class PairArrays:
 
     def arrays(self) -> list[Any]:
         """The kernel's arguments, in the order of `Pairs.arguments`; another cut-off makes it find neighbours anew."""
+        split = [self._split] * self.pairs.one_way
         if not self.pairs.near:
-            return [self.rows, self._work, self._forces]
+            return [self.rows, self._work, self._forces, *split]
         now = self.pairs.force.reach(self.particles), self.pairs.force.box
         if now != self._known:
             self._known = now
@@ -634,7 +644,7 @@ class PairArrays:
         if 5 * self._head[2] > 4 * self._head[1]:  # before it is full: a run that begins again finds all anew
             self._reserve(int(self._head[2]))
         return [
-            self.rows, self._work, self._forces, self._head, self._cells, self._neighbours, self._origin,
+            self.rows, self._work, self._forces, self._head, self._cells, self._neighbours, self._origin, *split,
         ]  # fmt: skip
 
     def _begin(self) -> None:
@@ -662,7 +672,7 @@ class PairArrays:
     def _reserve(self, most: int) -> None:
         """Room for half as many neighbours again; those that are known stay, so that growing changes no bit."""
         room, old = most * 3 // 2 + 16, int(self._head[1])
-        count = len(self.rows)
+        count = int(self._split[1])
         grown = np.zeros(room * count + PIECE, np.int32)
         if old:
             each = min(old, room)
@@ -670,6 +680,14 @@ class PairArrays:
                 :, :each
             ]
         self._head[1], self._neighbours = room, grown
+
+
+def _rows(force: PairForce, particles: Particles, place: Rows) -> tuple[Rows, Rows]:
+    """The rows of a kernel that are acted on or act, and where in them these begin and those end."""
+    on, by = (place[rows][place[rows] >= 0].astype(np.int64) for rows in force.ends(particles))
+    both = np.isin(on, by)
+    rows = np.concatenate([on[~both], on[both], by[~np.isin(by, on)]])
+    return rows, np.array([len(on) - both.sum(), len(on)], np.int64)
 
 
 def _reach(force: PairForce, particles: Particles) -> float:

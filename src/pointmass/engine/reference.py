@@ -21,6 +21,7 @@ from pointmass.collisions.impacts import Impacts
 from pointmass.collisions.response import respond
 from pointmass.collisions.swept import Paths, first_hit
 from pointmass.errors import PointmassError
+from pointmass.motions import Motions
 from pointmass.particles import Array
 from pointmass.solvers.advance import Stats, advance
 from pointmass.solvers.base import Memory, Solver, Step
@@ -59,6 +60,7 @@ class ReferenceEngine:
     stats : work done so far.
     died : rows of the particles that a surface killed in the last step, to be taken away.
     watched : whether impacts are to be told.
+    motions : of pinned particles.
     """
 
     system: ParticleSystem
@@ -67,6 +69,7 @@ class ReferenceEngine:
     stats: Stats = field(default_factory=Stats)
     died: Rows = field(default_factory=lambda: np.zeros(0, np.intp))
     watched: bool = False
+    motions: Motions = field(default_factory=Motions)
 
     def __post_init__(self) -> None:
         surfaces = surfaces_of(self.system)
@@ -97,6 +100,7 @@ class ReferenceEngine:
         system = self.system
         self._pieces, self._seen = [], []
         self.memory = self._fitted_memory()
+        self._lead(t0, t1)
         self._ids, self._islands = system.particles.id, system.island_of_particle
         self._events = np.zeros(len(self._ids), np.int64)
         self._ground = np.zeros((len(self._ids), 3))  # velocity of the surface that each hit last
@@ -118,8 +122,18 @@ class ReferenceEngine:
         self.stats = self.stats + stats
         self.died = np.flatnonzero(self._events >= KILLED)
         system.set_state(y, t1)
+        self.motions.put(system.particles, system.particles.x, system.particles.v, t1)
         if self.memory:
             self._left = self._touchable()
+
+    def _lead(self, t0: float, t1: float) -> None:
+        """Put pins that move where the solver sees them in a step; they have always been there, as far as it knows."""
+        p = self.system.particles
+        rows = self.motions.put_in_step(p, t0, t1)
+        if len(rows) and "y_before" in self.memory:
+            before = self.memory["y_before"] = self.memory["y_before"].copy()
+            for entries, column in zip(_by_particle(before, self.system.order), (p.x, p.v), strict=False):
+                entries[rows] = column[rows]
 
     @property
     def impacts(self) -> Impacts:

@@ -21,7 +21,7 @@ from pointmass.engine.motion import LANE, STATE, Flight, Lanes, Motion, W
 from pointmass.engine.phases import REACHED
 from pointmass.engine.printing import function, indented
 from pointmass.engine.reference import KILLED
-from pointmass.engine.threads import spread
+from pointmass.engine.threads import LINE, spread
 from pointmass.solvers.advance import Stats
 from pointmass.solvers.base import Memory, Solver
 from pointmass.system import ParticleSystem
@@ -53,8 +53,12 @@ def load(s, offset, x, lo, m):
 def copy(kept, x, lo, m):
     """Rows of x to where they are kept."""
     a = np.uintp(3 * lo)
-    for j in range(3 * m):
-        kept[a + np.uintp(j)] = x[a + np.uintp(j)]
+    if m == {W}:
+        for j in range(0, {3 * W}, {LINE} // x.itemsize):
+            streamed(kept, a + np.uintp(j), x)
+    else:
+        for j in range(3 * m):
+            kept[a + np.uintp(j)] = x[a + np.uintp(j)]
 
 
 @njit(**FLAGS)
@@ -123,32 +127,48 @@ class SinglesKernel:
         step = [*motion.lines]
         if clear is not None:
             step += motion.watched(clear)
-        step += motion.arrived()
         timed = motion.timed or (clear is not None and bool(clear.step))
-        long = timed or len(step) > LONG or bool(motion.binder.functions)  # functions are longer than they look
+        size = len(step) + (0 if clear is None else len(clear.inner))
+        long = timed or size > LONG or bool(motion.binder.functions)  # functions are longer than they look
         unrolled = [u for u in UNROLLED if u == 1 or not long]
         lanes = [self._unrolled(u, step, clear) for u in unrolled]
         alone = "" if flight is None else flight.text + WAITS
-        return "".join([REACHED, motion.binder.functions, alone, TRANSPOSED, *lanes, self._run(unrolled)])
+        return "".join([REACHED, motion.binder.functions, alone, TRANSPOSED, *lanes, self._run(unrolled, clear)])
 
     def _unrolled(self, count: int, step: list[str], clear: ClearLines | None) -> str:
         """The function that makes a few steps of all lanes, with the state in registers in between."""
         arguments = ", ".join([*self.shared, *(f"t{j}" for j in range(count + 1))])
-        loop = [f"for j in range({W}):", *indented([f"{LANE} = np.uintp(j)", *self._lane(count, step, clear)], 1)]
-        lines = [*self._head(count, clear), *loop, "return status"]
+        looks = [] if clear is None else self._looks(clear)
+        lines = [*self._head(count, clear), *looks, *_lanes(self._lane(count, step, clear)), "return status, waiting"]
         return function(f"lanes{count}", arguments, "**FLAGS", lines)
 
     def _head(self, unrolled: int, clear: ClearLines | None) -> list[str]:
         """What all lanes have in common."""
+        longest = "h0" if unrolled == 1 else f"max({', '.join(f'h{j}' for j in range(unrolled))})"
         return [
             *self.motion.binder.numbers.lines(),
             *(f"h{j} = R(t{j + 1} - t{j})" for j in range(unrolled)),
             "t = t0",
             "h = t1 - t0",
             "status = 0",
+            "waiting = False",
             *self.motion.at_time,
-            *([] if clear is None else [*clear.once, *clear.step]),
+            *([] if clear is None else [*clear.once, *clear.step, self.motion.third(longest)]),
         ]
+
+    def _looks(self, clear: ClearLines) -> list[str]:
+        """The searches of all lanes in the data of surfaces, before their step, which is then one of vectors."""
+        lines = []
+        place = [f"{name}0 = {entry}" for name, entry in zip("xyz", self.motion.entries.values(), strict=False)]
+        for k, (apart, bound) in enumerate(clear.looked.values()):
+            found = self._found(k)
+            lines += _lanes([*place, f"{found} = {apart}"])
+            lines += _lanes([f"if not {found} > R(0):", *indented([*place, f"{found} = {bound}"], 1)])
+        return lines
+
+    def _found(self, k: int) -> str:
+        """Where a lane keeps what it has found in a search: behind the columns."""
+        return f"s[{(STATE + len(self.motion.binder.particle.getters) + k) * W} + {LANE}]"
 
     def _lane(self, unrolled: int, step: list[str], clear: ClearLines | None) -> list[str]:
         """The steps of a lane; one that waits keeps its state."""
@@ -157,19 +177,24 @@ class SinglesKernel:
         waiting = f"s[{6 * W} + {LANE}]"
         keep = [f"{entry} = {name}" for name, entry in place.items()]
         first: list[str] = []
+        between = motion.arrived()
         last: list[str] = []
         if self.flight is not None:
             last = [f"waits = {waiting} != R(0)"]
             if clear is not None:
                 first = [f"radius = {motion.binder.attribute('radius', LANE)}", *motion.path(0), *clear.begin]
+                first += [f"{name} = {self._found(k)}" for k, name in enumerate(clear.looked)]
+                between = [*clear.inner, *between]
                 moves = f"({motion.binder.attribute('w', LANE)} != R(0)) & " if motion.pins else ""
                 last += [*clear.end, f"waits = waits | ({moves}(not ({clear.result})))"]
             keep = [f"{entry} = {entry} if waits else {name}" for name, entry in place.items()]
             keep.append(f"{waiting} = R(1) if waits else R(0)")
+            keep.append("waiting |= waits")
         return [
             *(f"{name} = {entry}" for name, entry in place.items()),
             *first,
-            *(line for j in range(unrolled) for line in (f"hr = h{j}", *step)),
+            *(line for j in range(unrolled - 1) for line in (f"hr = h{j}", *step, *between)),
+            *(f"hr = h{unrolled - 1}", *step, *motion.arrived()),
             *last,
             *keep,
         ]
@@ -192,7 +217,7 @@ class SinglesKernel:
             f"        {waiting} = {'R(1) if i < m and died[lo + i] != 0 else ' if self.deadly else ''}R(0)",
         ]
 
-    def _run(self, unrolled: list[int]) -> str:
+    def _run(self, unrolled: list[int], clear: ClearLines | None) -> str:
         """The kernel itself: tiles of particles over a span."""
         motion, flight, order = self.motion, self.flight, self.system.order
         columns = len(motion.binder.particle.getters)
@@ -203,7 +228,7 @@ class SinglesKernel:
         if flight is not None:
             prepared = flight.scratch
             began = [f"for i in range({W}):", f"    s[{6 * W} + i] = R(0)"]
-            caught = [f"if somebody_waits(s, 0, {W}):", *indented(self._catch_up(flight), 1)]
+            caught = ["if waiting:", *indented(self._catch_up(flight), 1)]
         if self.births:
             began += ["late = -np.inf", "for i in range(m):", "    late = max(late, birth[lo + i])"]
             hold = ["if late > t0 + k * dt:", "    for i in range(m):"]
@@ -213,12 +238,14 @@ class SinglesKernel:
         for u in unrolled:
             times = ", ".join(f"t0 + (k + {j}) * dt" for j in range(u + 1))
             few = f"k + {u} <= k0 + count" if u > 1 else "stride == 1"
-            steps += [f"if {few}:", f"    bad |= lanes{u}({shared}, {times})", *[f"    stride = {u}"] * (u > 1)]
+            steps += [f"if {few}:", f"    went, waiting = lanes{u}({shared}, {times})", "    bad |= went"]
+            steps += [f"    stride = {u}"] * (u > 1)
         steps = ["while k < k0 + count:", *indented([*steps, *caught, "k += stride"], 1)]
         arrays = [*motion.binder.arrays, *(["F"] if self.system.colliders else [])]
         given = f"first, last, x, v, x_kept, v_kept, {', '.join(arrays)}, birth, t0, dt, k0, count, status, reach"
         given += ", died" * self.deadly + ", hit" * self.watched
-        made = [f"s = np.ones({(STATE + columns) * W}, R)", *prepared]
+        searches = 0 if clear is None else len(clear.looked)
+        made = [f"s = np.ones({(STATE + columns + searches) * W}, R)", *prepared]
         own = [f"    s[{(STATE + c) * W} + i] = C[{c}, lo + i]" for c in range(columns)]
         tile = [
             f"lo = tile * {W}",
@@ -265,6 +292,11 @@ class SinglesKernel:
         return SingleMembers(self, rows)
 
 
+def _lanes(statements: list[str]) -> list[str]:
+    """A loop over all lanes of a tile."""
+    return [f"for j in range({W}):", *indented([f"{LANE} = np.uintp(j)", *statements], 1)]
+
+
 @dataclass(eq=False)
 class SingleMembers:
     """Particles that are islands of their own.
@@ -293,10 +325,11 @@ class SingleMembers:
         status, reach = np.zeros(tiles, np.int64), np.zeros((tiles, 2), x.dtype)
         grid = (span.t0, span.dt, span.first, span.count)
         kernel, scratch = self.kernel.functions["run"], self.kernel.functions["scratch"]
-        died, hit = np.zeros(count, np.uint8), np.zeros(count * self.kernel.watched, np.uint8)
+        died, hit = (np.zeros(count * told, np.uint8) for told in (self.kernel.deadly, self.kernel.watched))
         marks = [*[died] * self.kernel.deadly, *[hit] * self.kernel.watched]
         arrays = (x, v, *kept, *data, *grid, status, reach, *marks)
         spread(lambda lo, hi: kernel(lo, hi, *arrays, *scratch([W if self.kernel.remembers else 1])), tiles, GRAIN)
         work = Stats(span.count, 0, span.count * motion.evaluations)
         far = reach.max(axis=0).astype(np.float64)
-        return Outcome(not status.any(), far, work, died=self.rows[died > 0], hit=self.rows[marked(contact, hit)])
+        told = self.rows[np.flatnonzero(died)], self.rows[marked(contact, hit)]
+        return Outcome(not status.any(), far, work, False, *told)

@@ -36,6 +36,7 @@ class StepText:
     memory : arrays of 3 numbers for each particle that the next step reads.
     kinds : of blocks of the matrix, whose layouts the functions read.
     in_place : whether the step ends in x and v themselves, those who are pinned at rest.
+    around : statements before the first step of a span and after the last, if x and v are elsewhere meanwhile.
     """
 
     work: list[str]
@@ -48,6 +49,7 @@ class StepText:
     memory: list[str] = field(default_factory=list)
     kinds: list[Kind] = field(default_factory=list)
     in_place: bool = False
+    around: tuple[str, ...] = ()
 
     @property
     def arrays(self) -> list[str]:

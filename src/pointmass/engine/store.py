@@ -33,7 +33,8 @@ import numpy as np
 from numba import njit, prange
 
 from pointmass.engine.inner import Inner
-from pointmass.engine.support import added, columns, exponent, mixed, scaled, select, significand, subtracted
+from pointmass.engine.support import added, columns, more_columns, put_back, subtracted
+from pointmass.engine.support import exponent, mixed, scaled, select, significand, streamed
 
 R = np.{dtype}
 OWNING = {{"_nrt": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True{fast}}}

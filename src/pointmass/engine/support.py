@@ -10,6 +10,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload, register_jitable
 
+from pointmass.engine.threads import LINE
 from pointmass.tracing import noise
 
 TINY = 2.0**-1022
@@ -137,6 +138,21 @@ def columns(target: Any, o: Any, width: int, source: Any, rows: Any, q: Any, ste
             target[int(o) + c * width + j] = source[record + c]
 
 
+def more_columns(target: Any, o: Any, width: int, source: Any, rows: Any, q: Any, step: int) -> None:
+    """The same of the first seven numbers."""
+    columns(target, o, width, source, rows, q, step)
+    for j in range(8):
+        target[int(o) + 6 * width + j] = source[8 * int(rows[int(q) + j * step]) + 6]
+
+
+def put_back(target: Any, rows: Any, q: Any, step: int, source: Any, o: Any, width: int) -> None:
+    """The way back for the first four numbers: columns of `source` into records of `target`."""
+    for j in range(8):
+        record = 8 * int(rows[int(q) + j * step])
+        for c in range(4):
+            target[record + c] = source[int(o) + c * width + j]
+
+
 def added(target: Any, o: Any, source: Any, q: Any) -> None:
     """Add four numbers of `source` at q to those of `target` at o."""
     target[int(o) : int(o) + 4] += source[int(q) : int(q) + 4]
@@ -145,6 +161,12 @@ def added(target: Any, o: Any, source: Any, q: Any) -> None:
 def subtracted(target: Any, o: Any, source: Any, q: Any) -> None:
     """Subtract four numbers of `source` at q from those of `target` at o."""
     target[int(o) : int(o) + 4] -= source[int(q) : int(q) + 4]
+
+
+def streamed(target: Any, o: Any, source: Any) -> None:
+    """Copy LINE bytes of numbers of `source` from o on to the same place of `target`, which nobody reads soon."""
+    count = LINE // target.itemsize
+    target[int(o) : int(o) + count] = source[int(o) : int(o) + count]
 
 
 def _vector(context: Any, builder: Any, kind: Any, array: Any, index: Any, count: int) -> tuple[Any, int]:
@@ -161,34 +183,73 @@ def _interleaved(builder: Any, a: Any, b: Any, size: int, high: bool) -> Any:
     return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(ir.IntType(32), 8), mask))
 
 
+def _record(context: Any, builder: Any, kind: Any, array: Any, row: Any, count: int) -> tuple[Any, int]:
+    """Where the first numbers of a record of eight are."""
+    first = builder.mul(builder.sext(row, ir.IntType(64)), ir.IntType(64)(8))
+    return _vector(context, builder, kind, array, first, count)
+
+
+def _turned(count: int) -> Any:
+    """Eight records into so many columns."""
+
+    @intrinsic
+    def turned(typingctx: Any, target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
+        def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            target, o, width, source, rows, q, step = arguments
+            kinds = dict(zip(("target", "source", "rows"), (signature.args[k] for k in (0, 3, 4)), strict=True))
+            places = context.make_array(kinds["rows"])(context, builder, rows).data
+            vectors = []
+            for j in range(8):
+                row = builder.load(builder.gep(places, [builder.add(q, builder.mul(step, step.type(j)))]))
+                place, align = _record(context, builder, kinds["source"], source, row, 8)
+                vectors.append(builder.load(place, align=align))
+            for size in (1, 2, 4):  # the halves of blocks of 2 size x 2 size numbers change places
+                other = list(vectors)
+                for a in range(8):
+                    if not a & size:
+                        other[a], other[a + size] = (
+                            _interleaved(builder, vectors[a], vectors[a + size], size, high) for high in (False, True)
+                        )
+                vectors = other
+            for c in range(count):
+                at = builder.add(o, builder.mul(width, width.type(c)))
+                place, align = _vector(context, builder, kinds["target"], target, at, 8)
+                builder.store(vectors[c], place, align=align)
+            return context.get_dummy_value()
+
+        number = types.uintp
+        return types.void(target, number, number, source, rows, number, number), build
+
+    return turned
+
+
+_columns, _more_columns = _turned(6), _turned(7)
+
+
 @intrinsic
-def _columns(typingctx: Any, target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
+def _put_back(typingctx: Any, target: Any, rows: Any, q: Any, step: Any, source: Any, o: Any, width: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        target, o, width, source, rows, q, step = arguments
-        kinds = dict(zip(("target", "source", "rows"), (signature.args[k] for k in (0, 3, 4)), strict=True))
-        places = context.make_array(kinds["rows"])(context, builder, rows).data
+        target, rows, q, step, source, o, width = arguments
+        places = context.make_array(signature.args[1])(context, builder, rows).data
         vectors = []
-        for j in range(8):
-            row = builder.load(builder.gep(places, [builder.add(q, builder.mul(step, step.type(j)))]))
-            first = builder.mul(builder.sext(row, q.type), q.type(8))
-            place, align = _vector(context, builder, kinds["source"], source, first, 8)
-            vectors.append(builder.load(place, align=align))
-        for size in (1, 2, 4):  # the halves of blocks of 2 size x 2 size numbers change places
-            other = list(vectors)
-            for a in range(8):
-                if not a & size:
-                    other[a], other[a + size] = (
-                        _interleaved(builder, vectors[a], vectors[a + size], size, high) for high in (False, True)
-                    )
-            vectors = other
-        for c in range(6):
+        for c in range(4):
             at = builder.add(o, builder.mul(width, width.type(c)))
-            place, align = _vector(context, builder, kinds["target"], target, at, 8)
-            builder.store(vectors[c], place, align=align)
+            place, align = _vector(context, builder, signature.args[4], source, at, 8)
+            vectors.append(builder.load(place, align=align))
+        for j in range(8):
+            first, second = (_picked(builder, vectors[c], vectors[c + 1], (j, 8 + j)) for c in (0, 2))
+            row = builder.load(builder.gep(places, [builder.add(q, builder.mul(step, step.type(j)))]))
+            place, align = _record(context, builder, signature.args[0], target, row, 4)
+            builder.store(_picked(builder, first, second, (0, 1, 2, 3)), place, align=align)
         return context.get_dummy_value()
 
     number = types.uintp
-    return types.void(target, number, number, source, rows, number, number), build
+    return types.void(target, rows, number, number, source, number, number), build
+
+
+def _picked(builder: Any, a: Any, b: Any, which: tuple[int, ...]) -> Any:
+    """Some of the numbers of two vectors, one after the other."""
+    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(ir.IntType(32), len(which)), list(which)))
 
 
 def _sum(operation: str) -> Any:
@@ -213,7 +274,53 @@ _added, _subtracted = _sum("fadd"), _sum("fsub")
 @overload(columns, inline="always")
 def _compiled_columns(target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
     def compiled(target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
-        return _columns(target, o, width, source, rows, q, step)  # type: ignore[call-arg]
+        return _columns(target, o, width, source, rows, q, step)
+
+    return compiled
+
+
+@overload(more_columns, inline="always")
+def _compiled_more(target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
+    def compiled(target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
+        return _more_columns(target, o, width, source, rows, q, step)
+
+    return compiled
+
+
+@overload(put_back, inline="always")
+def _compiled_put_back(target: Any, rows: Any, q: Any, step: Any, source: Any, o: Any, width: Any) -> Any:
+    def compiled(target: Any, rows: Any, q: Any, step: Any, source: Any, o: Any, width: Any) -> Any:
+        return _put_back(target, rows, q, step, source, o, width)  # type: ignore[call-arg]
+
+    return compiled
+
+
+@intrinsic
+def _streamed(typingctx: Any, target: Any, o: Any, source: Any) -> Any:
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        target, o, source = arguments
+        kind = signature.args[0]
+        count = LINE // context.get_abi_sizeof(context.get_data_type(kind.dtype))
+        place, align = _vector(context, builder, kind, target, o, count)
+        there, _ = _vector(context, builder, signature.args[2], source, o, count)
+        line = builder.load(there, align=align)
+        number = ir.IntType(64)
+        beyond = builder.and_(builder.ptrtoint(place, number), number(LINE - 1))
+        with builder.if_else(builder.icmp_unsigned("==", beyond, number(0))) as (whole, parts):
+            with whole:  # past the caches; the locks by which threads hand over work order it
+                store = builder.store(line, place, align=LINE)
+                store.set_metadata("nontemporal", builder.module.add_metadata([ir.IntType(32)(1)]))
+            with parts:
+                builder.store(line, place, align=align)
+        return context.get_dummy_value()
+
+    return types.void(target, types.uintp, source), build
+
+
+@overload(streamed, inline="always")
+def _compiled_streamed(target: Any, o: Any, source: Any) -> Any:
+    def compiled(target: Any, o: Any, source: Any) -> Any:
+        return _streamed(target, o, source)  # type: ignore[call-arg]
 
     return compiled
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -15,11 +16,15 @@ from itertools import pairwise
 
 from pointmass.errors import InvalidInput, whole_number
 
+LINE = 64  # bytes of memory that go to and from a processor together
 PIECES = 8  # for each thread, so that one who is late does not keep all waiting
 
 
 def spread(work: Callable[[int, int], object], count: int, grain: int) -> None:
-    """Call `work(first, last)` on pieces of range(count), each of `grain` items or more, by the threads of Numba."""
+    """Call `work(first, last)` on pieces of range(count), each of `grain` items or more, by the threads of Numba.
+
+    The caller is one of them: it need not wait until others wake up, which takes longer than a small piece.
+    """
     import numba
 
     threads = numba.get_num_threads()
@@ -28,8 +33,23 @@ def spread(work: Callable[[int, int], object], count: int, grain: int) -> None:
         work(0, count)
         return
     ends = [count * k // pieces for k in range(pieces + 1)]
-    for done in [_pool(os.getpid(), threads).submit(work, a, b) for a, b in pairwise(ends)]:
-        done.result()
+    left = deque(pairwise(ends))
+
+    def take() -> None:
+        while True:
+            try:
+                first, last = left.popleft()
+            except IndexError:  # all are taken
+                return
+            work(first, last)
+
+    others = [_pool(os.getpid(), threads).submit(take) for _ in range(min(threads, pieces) - 1)]
+    try:
+        take()
+    finally:
+        for other in others:
+            if not other.cancel():  # who has not begun yet finds nothing to do
+                other.result()
 
 
 def use_threads(threads: int | None) -> None:

@@ -22,26 +22,35 @@ def cube_along(u, count):
 
 @njit(**FLAGS)
 def triangles_cube(P, k, x, y, z):
-    """The cube of the coarse grid around a point, or that which is nearest to it."""
+    """The cube of the coarse grid around a point, or one that is near, and how far the point is from its middle."""
     row = k * ROW
     size = P[row + CUBE]
     u, v, w = (x - P[row + CUBES]) * size, (y - P[row + CUBES + 1]) * size, (z - P[row + CUBES + 2]) * size
     nx, ny, nz = P[row + ALONG], P[row + ALONG + 1], P[row + ALONG + 2]
-    return (cube_along(u, nx) * int(ny) + cube_along(v, ny)) * int(nz) + cube_along(w, nz)
+    i, j, k = cube_along(u, nx), cube_along(v, ny), cube_along(w, nz)
+    away = length3(u - i - 0.5, v - j - 0.5, w - k - 0.5) / size
+    return (i * int(ny) + j) * int(nz) + k, away
+
+
+@njit(**FLAGS)
+def triangles_apart(P, k, x, y, z):
+    """A lower bound of the distance for places beyond the coarse grid; for others not above 0."""
+    row = k * ROW
+    size = P[row + CUBE]
+    u, v, w = (x - P[row + CUBES]) * size, (y - P[row + CUBES + 1]) * size, (z - P[row + CUBES + 2]) * size
+    beyond = max(max(-u, u - P[row + ALONG]), max(-v, v - P[row + ALONG + 1]))
+    beyond = max(beyond, max(-w, w - P[row + ALONG + 2]))
+    return P[row + RIM] + beyond / size if beyond > 0.0 else 0.0
 
 
 @njit(**FLAGS)
 def triangles_bound(P, k, x, y, z):
-    """A lower bound of the distance, at once; below 0 where there is none."""
-    row = k * ROW
-    size = P[row + CUBE]
-    u, v, w = (x - P[row + CUBES]) * size, (y - P[row + CUBES + 1]) * size, (z - P[row + CUBES + 2]) * size
-    u = max(max(-u, u - P[row + ALONG]), 0.0) / size  # beyond the grid
-    v = max(max(-v, v - P[row + ALONG + 1]), 0.0) / size
-    w = max(max(-w, w - P[row + ALONG + 2]), 0.0) / size
-    least = P[int(P[row + DATA]) + int(P[row + BOUNDS]) + triangles_cube(P, k, x, y, z)]
-    most = max(max(u, v), w)
-    return least if most == 0.0 else max(least - length3(u, v, w), P[row + RIM] + most)
+    """The same for all places, at once; below 0 deep in a solid."""
+    apart = triangles_apart(P, k, x, y, z)
+    if apart > 0.0:
+        return apart
+    cube, away = triangles_cube(P, k, x, y, z)
+    return P[int(P[k * ROW + DATA]) + int(P[k * ROW + BOUNDS]) + cube] - away
 
 
 @njit(**FLAGS)
@@ -57,7 +66,7 @@ def triangles_look(P, C, m, k, x, y, z):
     slack = SLACK * (P[row + EXTENT] + abs(x) + abs(y) + abs(z))
     moved = length3(x - C[m + SEARCHED], y - C[m + SEARCHED + 1], z - C[m + SEARCHED + 2]) + slack
     if not moved < C[m + OTHERS]:
-        cube = triangles_cube(P, k, x, y, z)
+        cube, _ = triangles_cube(P, k, x, y, z)
         C[m + LISTED], C[m + LIST] = 1.0, P[boxes + int(P[row + HINTS]) + cube]
         C[m + OTHERS] = C[m + LEAST] = 0.0
     which = -1

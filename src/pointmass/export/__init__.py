@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from pointmass.beside import beside, check_place
 from pointmass.errors import InvalidInput, unknown
+from pointmass.export.meshes import WRITERS, write_meshes
 from pointmass.export.npz import write_npz
 from pointmass.frame import Frame
+from pointmass.sequences import is_sequence
 
 Exporter = Callable[[Sequence[Frame], Path, Callable[[int], None] | None], None]
 
-EXPORTERS: dict[str, Exporter] = {".npz": write_npz}
+EXPORTERS: dict[str, Exporter] = {".npz": write_npz, **dict.fromkeys(WRITERS, write_meshes)}
 
-__all__ = ["EXPORTERS", "check_export", "export", "write_npz"]
+__all__ = ["EXPORTERS", "check_export", "export", "write_meshes", "write_npz"]
 
 
 def check_export(path: str | Path) -> Exporter:
@@ -23,40 +25,35 @@ def check_export(path: str | Path) -> Exporter:
     Raises
     ------
     InvalidInput
-        The suffix is not known, or there is no folder to write into.
+        The suffix is not known, a % in the name is no number, or there is no folder to write into.
     """
     path = Path(path)
     if path.suffix.lower() not in EXPORTERS:
         raise unknown("kind of export", path.suffix, EXPORTERS)
-    if not path.parent.is_dir():
-        raise InvalidInput(f"cannot write {str(path)!r}: there is no folder {str(path.parent)!r}")
-    if path.is_dir():
-        raise InvalidInput(f"cannot write {str(path)!r}: it is a folder")
+    if path.suffix.lower() in WRITERS:
+        is_sequence(path)
+    check_place(path)
     return EXPORTERS[path.suffix.lower()]
 
 
 def export(frames: Sequence[Frame], path: str | Path, progress: Callable[[int], None] | None = None) -> None:
-    """Write frames to a file; its suffix says which kind. The file appears when it is complete.
+    """Write frames to a file; its suffix says which kind. Files appear when all are complete.
 
     Parameters
     ----------
     frames : such as a cache.
-    path : `.npz`.
+    path : `.npz`: all frames as arrays; `.obj`, `.ply` or `.glb`: the surfaces of the last frame, or of each frame for
+        a name such as `x_%04d.obj`.
     progress : called with the number of frames written so far.
 
     Raises
     ------
     InvalidInput
-        The suffix is not known, there are no frames, or the file cannot be written.
+        The suffix is not known, there are no frames, a frame has no surface, or the file cannot be written.
     """
     path = Path(path)
     write = check_export(path)
     if not len(frames):
         raise InvalidInput("there are no frames to export")
-    try:
-        with tempfile.TemporaryDirectory(prefix=f".{path.stem[:32]}-", dir=path.parent) as folder:
-            part = Path(folder) / path.name
-            write(frames, part, progress)
-            part.replace(path)
-    except OSError as error:
-        raise InvalidInput(f"cannot write {str(path)!r}: {error.strerror}") from None
+    with beside(path) as part:
+        write(frames, part, progress)

@@ -5,12 +5,17 @@ from __future__ import annotations
 from pointmass.errors import unknown
 from pointmass.forces.angles import Angles
 from pointmass.forces.attractor import Attractor
+from pointmass.forces.avoid import Avoid
 from pointmass.forces.buoyancy import Buoyancy
+from pointmass.forces.cruise import Cruise
 from pointmass.forces.curl_noise import CurlNoise
 from pointmass.forces.cushion import Cushion
 from pointmass.forces.diffusion import Diffusion
 from pointmass.forces.drag import Drag
 from pointmass.forces.field import Field
+from pointmass.forces.fins import Fins
+from pointmass.forces.flee import Flee
+from pointmass.forces.flocking import Flocking
 from pointmass.forces.flow import Flow
 from pointmass.forces.flutter import Flutter
 from pointmass.forces.gravitation import Gravitation
@@ -22,10 +27,14 @@ from pointmass.forces.hinges import Hinges
 from pointmass.forces.lennard_jones import LennardJones
 from pointmass.forces.line_attractor import LineAttractor
 from pointmass.forces.magnetic import Magnetic
+from pointmass.forces.muscles import Muscles
 from pointmass.forces.plate_wind import PlateWind
 from pointmass.forces.point_vortices import PointVortices
 from pointmass.forces.quadratic_drag import QuadraticDrag
 from pointmass.forces.ring_attractor import RingAttractor
+from pointmass.forces.scales import Scales
+from pointmass.forces.seek import Seek
+from pointmass.forces.slender_drag import SlenderDrag
 from pointmass.forces.soft_sphere import SoftSphere
 from pointmass.forces.springs import Springs
 from pointmass.forces.surface_attractor import SurfaceAttractor
@@ -33,6 +42,7 @@ from pointmass.forces.volumes import Volumes
 from pointmass.forces.vortex import Vortex
 from pointmass.forces.vortex_line import VortexLine
 from pointmass.forces.vortex_ring import VortexRing
+from pointmass.forces.water import Water
 from pointmass.forces.wind import Wind
 from pointmass.laws.force import Force
 
@@ -41,6 +51,9 @@ FORCES: dict[str, type[Force]] = {
     "drag": Drag,
     "quadratic_drag": QuadraticDrag,
     "springs": Springs,
+    "muscles": Muscles,
+    "scales": Scales,
+    "slender_drag": SlenderDrag,
     "angles": Angles,
     "hinges": Hinges,
     "volumes": Volumes,
@@ -53,6 +66,11 @@ FORCES: dict[str, type[Force]] = {
     "gravitation": Gravitation,
     "lennard_jones": LennardJones,
     "soft_sphere": SoftSphere,
+    "flocking": Flocking,
+    "flee": Flee,
+    "seek": Seek,
+    "avoid": Avoid,
+    "cruise": Cruise,
     "vortex": Vortex,
     "vortex_line": VortexLine,
     "vortex_ring": VortexRing,
@@ -63,6 +81,8 @@ FORCES: dict[str, type[Force]] = {
     "diffusion": Diffusion,
     "wind": Wind,
     "plate_wind": PlateWind,
+    "water": Water,
+    "fins": Fins,
     "field": Field,
     "flow": Flow,
     "buoyancy": Buoyancy,
@@ -73,12 +93,17 @@ __all__ = [
     "FORCES",
     "Angles",
     "Attractor",
+    "Avoid",
     "Buoyancy",
+    "Cruise",
     "CurlNoise",
     "Cushion",
     "Diffusion",
     "Drag",
     "Field",
+    "Fins",
+    "Flee",
+    "Flocking",
     "Flow",
     "Flutter",
     "Force",
@@ -90,10 +115,14 @@ __all__ = [
     "LennardJones",
     "LineAttractor",
     "Magnetic",
+    "Muscles",
     "PlateWind",
     "PointVortices",
     "QuadraticDrag",
     "RingAttractor",
+    "Scales",
+    "Seek",
+    "SlenderDrag",
     "SoftSphere",
     "Springs",
     "SurfaceAttractor",
@@ -101,6 +130,7 @@ __all__ = [
     "Vortex",
     "VortexLine",
     "VortexRing",
+    "Water",
     "Wind",
     "find_force",
     "load_grid",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from pointmass.laws.parameter import Parameter, Vector
 from pointmass.laws.unary import VelocityField
 from pointmass.particles import Particles
 from pointmass.tracing import functions as fn
+from pointmass.tracing.trace import Traced, trace
 
 Velocity = Vector | VelocityField | Sequence[Vector | VelocityField]
 
@@ -24,6 +26,7 @@ class Air:
     ----------
     flows : the fields that it is made of; their parameters stay their own.
     parameters : of the law.
+    traced : the law as a program.
 
     Parameters
     ----------
@@ -54,6 +57,14 @@ class Air:
                 self._parts.append((None, [Parameter(name, part, vector=True, unit="m/s")]))
         self.flows = [flow for flow, _ in self._parts if flow is not None]
         self.parameters = [p for _, own in self._parts for p in own]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "traced"}  # traced again where needed
+
+    @cached_property
+    def traced(self) -> Traced:
+        own = {p.name: "vector" if p.vector else "scalar" for p in self.parameters}
+        return trace(lambda x, t, *p: self.law(x, t, p), {"x": "vector", "t": "scalar"} | own, 3, "air")
 
     def law(self, x: Any, t: Any, parameters: Sequence[Any]) -> Any:
         """The velocity at a place and time [m/s], for the values of its parameters."""

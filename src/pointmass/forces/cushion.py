@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
-from pointmass.errors import InvalidInput
 from pointmass.forces.solids import Solid, Solids
 from pointmass.laws.parameter import Parameter, Scalar
 from pointmass.laws.unary import UnaryForce
@@ -46,9 +45,7 @@ class Cushion(UnaryForce):
         on: Selection = None,
         enabled: bool = True,
     ) -> None:
-        self.solids = Solids(around)
-        if not self.solids.surfaces:
-            raise InvalidInput("around = [] is not allowed: give the colliders on which it lies, such as [Sphere()]")
+        self.solids = Solids(around, "on which it lies")
         parameters = [
             *self.solids.parameters,
             Parameter("k_s", k_s, unit="N/m", at_least=0),

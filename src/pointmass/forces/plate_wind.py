@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from numpy.typing import ArrayLike
-
-from pointmass.errors import unknown
-from pointmass.forces.air import Air, Velocity
-from pointmass.laws.elements import ElementForce
+from pointmass.forces.air import Velocity
+from pointmass.forces.exposed import Plates, Triangles
 from pointmass.laws.parameter import Parameter, Scalar
-from pointmass.particles import Particles
 from pointmass.tracing import functions as fn
 
-Triangles = str | ArrayLike  # a surface's name, or ids
 
-
-class PlateWind(ElementForce):
+class PlateWind(Plates):
     """F = rho/2 A |w|^2 cos(b) (drag e + lift (n - cos(b) e)) on a flat plate, a third of it on each of its corners.
 
     w = |w| e is the wind relative to the mean velocity of the corners, A the area, n the unit normal on the side to
@@ -33,6 +27,7 @@ class PlateWind(ElementForce):
 
     Attributes
     ----------
+    air : the velocity as a law of its own.
     flows : the fields of the velocity.
 
     Notes
@@ -46,9 +41,6 @@ class PlateWind(ElementForce):
     >>> pm.PlateWind("cloth", velocity=pm.Gust((4, 0, 0)))
     """
 
-    nodes = 3
-    internal = False
-
     def __init__(
         self,
         triangles: Triangles,
@@ -59,33 +51,21 @@ class PlateWind(ElementForce):
         *,
         enabled: bool = True,
     ) -> None:
-        self._air = Air(velocity, "the particles")
-        self.flows = self._air.flows
         parameters = [
             Parameter("density", density, unit="kg/m^3", at_least=0),
             Parameter("drag", drag, at_least=0),
             Parameter("lift", lift, at_least=0),
         ]
-        self._surface = triangles if isinstance(triangles, str) else None
-        super().__init__(() if self._surface else triangles, [*parameters, *self._air.parameters], enabled)
+        super().__init__(triangles, parameters, velocity, enabled)
 
     def law(self, *arguments: Any) -> Any:
         """Forces on the three corners [N]."""
-        x1, v1, x2, v2, x3, v3, t, density, drag, lift, *velocity = arguments
-        middle, moves = (fn.scale(1.0 / 3.0, fn.add(fn.add(a, b), c)) for a, b, c in ((x1, x2, x3), (v1, v2, v3)))
-        w = fn.sub(self._air.law(middle, t, velocity), moves)
-        normal = fn.scale(0.5, fn.cross(fn.sub(x2, x1), fn.sub(x3, x1)))  # as long as the area A
+        *state, t, density, drag, lift = arguments[:10]
+        normal, moves, air = self.exposed(state, t, arguments[10:])
+        w = fn.sub(air, moves)
         area, speed, flux = fn.length(normal), fn.length(w), fn.dot(normal, w)
         # |w|^2 A cos(b) n = flux |w| normal / A, and |w|^2 A cos(b)^2 e = flux^2 w / (A |w|)
         push = fn.scale(drag * fn.absolute(flux) - lift * flux * flux * fn.inverse(area * speed), w)
         rise = fn.scale(lift * flux * speed * fn.inverse(area), normal)
         third = fn.scale(density / 6.0, fn.add(push, rise))
         return [third, third, third]
-
-    def bind(self, particles: Particles) -> None:
-        self._air.bind(particles)
-        if self._surface is not None:
-            if self._surface not in particles.surfaces:
-                raise unknown("surface", self._surface, particles.surfaces)
-            self.ids = particles.surfaces[self._surface].triangles
-        super().bind(particles)

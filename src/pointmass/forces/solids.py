@@ -48,14 +48,15 @@ class Solids:
     Parameters
     ----------
     around : a collider or a list of them.
+    needed : what they are for, such as "to avoid", where there must be one.
 
     Raises
     ------
     InvalidInput
-        Something else, or a collider without a formula.
+        Something else, a collider without a formula, or none where one is needed.
     """
 
-    def __init__(self, around: Any) -> None:
+    def __init__(self, around: Any, needed: str = "") -> None:
         solids = list(around) if isinstance(around, (list, tuple)) else [around]
         for solid in solids:
             if not hasattr(solid, "distance_law"):
@@ -66,6 +67,8 @@ class Solids:
                     "capsules or cylinders about as large"
                 )
         self.surfaces = [surface for solid in solids for surface in solid.surfaces]
+        if needed and not self.surfaces:
+            raise InvalidInput(f"around = [] is not allowed: give the colliders {needed}, such as [Sphere()]")
         self.parameters: list[Parameter] = []
         for k, surface in enumerate(self.surfaces):
             place = copy(surface.motion.parameters[0])

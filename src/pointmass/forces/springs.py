@@ -30,6 +30,7 @@ class Springs(ConstraintForce):
 
     nodes = 2
     unit = "m"
+    convex = True
 
     def __init__(
         self,

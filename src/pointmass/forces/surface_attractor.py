@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from pointmass.errors import InvalidInput
 from pointmass.forces.pull import Pull
 from pointmass.forces.solids import Solid, Solids
 from pointmass.laws.parameter import Scalar
@@ -44,11 +43,7 @@ class SurfaceAttractor(Pull):
         on: Selection = None,
         enabled: bool = True,
     ) -> None:
-        self.solids = Solids(around)
-        if not self.solids.surfaces:
-            raise InvalidInput(
-                "around = [] is not allowed: give the colliders whose surfaces attract, such as [Sphere()]"
-            )
+        self.solids = Solids(around, "whose surfaces attract")
         super().__init__(self.solids.parameters, strength, power, eps, reach, on, enabled)
 
     def ways(self, x: Any, own: dict[str, Any]) -> list[Any]:

@@ -25,6 +25,7 @@ class Wind(UnaryForce):
 
     Attributes
     ----------
+    air : the velocity as a law of its own.
     flows : the fields of the velocity.
 
     Examples
@@ -40,14 +41,14 @@ class Wind(UnaryForce):
         on: Selection = None,
         enabled: bool = True,
     ) -> None:
-        self._air = Air(velocity, "Wind")
-        self.flows = self._air.flows
-        super().__init__([Parameter("k", k, unit="N s/m", at_least=0), *self._air.parameters], on, enabled)
+        self.air = Air(velocity, "Wind")
+        self.flows = self.air.flows
+        super().__init__([Parameter("k", k, unit="N s/m", at_least=0), *self.air.parameters], on, enabled)
 
     def law(self, x: Any, v: Any, m: Any, t: Any, k: Any, *velocity: Any) -> Any:
         """Force [N]."""
-        return fn.scale(k, fn.sub(self._air.law(x, t, velocity), v))
+        return fn.scale(k, fn.sub(self.air.law(x, t, velocity), v))
 
     def bind(self, particles: Particles) -> None:
-        self._air.bind(particles)
+        self.air.bind(particles)
         super().bind(particles)

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pointmass.errors import InvalidInput, whole_number
-from pointmass.laws.colouring import coloured
 from pointmass.laws.force import Array, Blocks, Force, Rows, clock, inputs_for, matrix
 from pointmass.laws.parameter import Parameter
 from pointmass.laws.unary import law_name, law_parameters, origin, parameters_from
@@ -36,6 +35,7 @@ class ElementForce(Force):
     family : what pictures and reports call them: the name of the force, unless it says something else.
     law : (x1, v1, ..., xk, vk, t, *parameters) -> the forces on all nodes, or on all but the last, which takes minus
         their sum.
+    divided : names of the parameters of which half an element has half, such as the stiffness of a spring.
 
     Notes
     -----
@@ -45,6 +45,7 @@ class ElementForce(Force):
 
     nodes: ClassVar[int] = 2
     internal: ClassVar[bool] = True
+    divided: ClassVar[tuple[str, ...]] = ()
     law: Callable[..., Any]
 
     def __init__(self, ids: ArrayLike, parameters: list[Parameter], enabled: bool = True) -> None:
@@ -120,20 +121,32 @@ class ElementForce(Force):
         for axis in range(3):
             np.add.at(f[:, axis], rows.ravel(), out[:, axis::3].ravel())
 
-    def add_jacobian(self, particles: Particles, t: Any, x: Array, v: Array, blocks: Blocks) -> None:
+    def add_jacobian(
+        self, particles: Particles, t: Any, x: Array, v: Array, blocks: Blocks, share: Array | None = None
+    ) -> None:
+        """Add df/dx and df/dv at (t, x, v).
+
+        Parameters
+        ----------
+        share : of what may make the matrix of an implicit step indefinite (see `softened`), of each particle; None =
+            all of it.
+        """
         rows = self.rows(particles)
-        dx, dv = self.element_jacobians(particles, t, x, v)
+        dx, dv = self.element_jacobians(particles, t, x, v, share)
         for a in range(self.nodes):
             for b in range(self.nodes):
                 blocks.add(rows[:, a], rows[:, b], dx[:, a, :, b], dv[:, a, :, b])
 
-    def element_jacobians(self, particles: Particles, t: Any, x: Array, v: Array) -> tuple[Array, Array]:
-        """df/dx and df/dv of each element for itself, each of shape (e, nodes, 3, nodes, 3).
+    def element_jacobians(
+        self, particles: Particles, t: Any, x: Array, v: Array, share: Array | None = None
+    ) -> tuple[Array, Array]:
+        """df/dx and df/dv of each element for itself, each of shape (e, nodes, 3, nodes, 3); `share` as above.
 
         Numbers of one kind lie side by side in memory, so that what is done with all elements runs along them.
         """
         k, e = self.nodes, len(self.ids)
-        values = self._jacobian.columns(*self._inputs(self._jacobian, particles, t, x, v))
+        law = self._jacobian if share is None else self.softened
+        values = law.columns(*self._inputs(law, particles, t, x, v, share))
         both = np.empty((len(values), e), x.dtype)
         for row, column in zip(both, values, strict=True):
             row[:] = column
@@ -161,6 +174,21 @@ class ElementForce(Force):
         for p in self.parameters.values():
             p.keep(whole)
 
+    def remake(self, ids: NDArray[np.int64], source: Rows, share: Array) -> None:
+        """Have other elements in place of the present ones: who breaks, is gone, and who tears, is there twice.
+
+        Parameters
+        ----------
+        ids : particles of the new elements, shape (e, nodes).
+        source : number of the present element from which each has its parameters, shape (e,).
+        share : of those that are `divided`, of which there is a number for each element, shape (e,).
+        """
+        self.ids, self._rows = ids, None
+        for name, p in self.parameters.items():
+            p.keep(source)
+            if name in self.divided:
+                p.scale(share)
+
     def shifted(self, offset: int) -> ElementForce:
         """Name particles `offset` higher: for bodies that are put together. Returns itself."""
         self.ids = self.ids + offset
@@ -171,6 +199,14 @@ class ElementForce(Force):
     def _jacobian(self) -> Traced:
         names = [n for a in range(self.nodes) for q in "xv" for n in vector_names(f"{q}{a + 1}")]
         return self.traced.jacobian(*names)
+
+    @property
+    def softened(self) -> Traced:
+        """df/dx and df/dv, of which an input `share` says how much is kept that may make a matrix indefinite.
+
+        Outputs are entries [node, axis, of node, x or v, axis]. A law of which no more is known is kept as it is.
+        """
+        return self._jacobian
 
     def _names(self, quantity: str) -> list[str]:
         return [f"{quantity}{a + 1}" for a in range(self.nodes)]
@@ -191,29 +227,33 @@ class ElementForce(Force):
             numbers += [-sum(numbers[axis + 3 :: 3], start=numbers[axis]) for axis in range(3)]
         return numbers
 
-    def _inputs(self, law: Traced, particles: Particles, t: Any, x: Array, v: Array) -> list[Any]:
+    def _inputs(
+        self, law: Traced, particles: Particles, t: Any, x: Array, v: Array, share: Array | None = None
+    ) -> list[Any]:
         rows = self.rows(particles)
         now = clock(t, rows[:, 0])
+        numbers = {"t": now} if share is None else {"t": now, "share": share[rows[:, 0]]}
         vectors = {f"{n}{a + 1}": q[rows[:, a]] for a in range(self.nodes) for n, q in (("x", x), ("v", v))}
         everything = np.arange(len(rows))
-        return inputs_for(law, vectors, {"t": now}, self.settings(particles, now, everything))
+        return inputs_for(law, vectors, numbers, self.settings(particles, now, everything))
 
 
 class ConstraintForce(ElementForce):
     """A damped spring of any scalar C(x1, ..., xk): a length, an angle, a volume.
 
     `f_a = -[k_s (C - rest) + k_d dC/dt] dC/dx_a`, with `dC/dt = sum_a dC/dx_a . v_a` (Witkin, Particle System Dynamics,
-    section on energy functions): force, damping, energy and Jacobian follow from C alone. Parameters are
-    named k_s, k_d and rest; without a rest, C at the start is measured.
+    section on energy functions): force, damping, energy and Jacobian follow from C alone. The first parameters are
+    named k_s, k_d and rest; without a rest, C at the start is measured. What others there are act through `resting`.
 
     Attributes
     ----------
     unit : of C.
+    convex : whether C is a convex function of the places, as a length is.
     """
 
     unit: ClassVar[str] = ""
-
-    _colours: tuple[Rows, Rows] | None = None
+    divided: ClassVar[tuple[str, ...]] = ("k_s", "k_d")
+    convex: ClassVar[bool] = False
 
     @staticmethod
     @abstractmethod
@@ -224,29 +264,60 @@ class ConstraintForce(ElementForce):
         """Measure C where no rest was given, and check the nodes."""
         if "rest" not in self.parameters:
             places = particles.x[self.found(particles)].astype(np.float64)
-            self.parameters["rest"] = Parameter("rest", self.at(places), unit=self.unit)
+            measured = Parameter("rest", self.at(places), unit=self.unit)
+            names = [*list(self.parameters)[:2], "rest", *list(self.parameters)[2:]]
+            self.parameters = {name: self.parameters.get(name, measured) for name in names}
         super().bind(particles)
+
+    @staticmethod
+    def resting(t: Any, rest: Any, *own: Any) -> Any:
+        """C without force at time t, from the parameter `rest` and those after it."""
+        return rest
 
     def law(self, *arguments: Any) -> Any:
         """The forces on all nodes."""
-        *state, _t, k_s, k_d, rest = arguments
-        x, v = state[0::2], state[1::2]
-        c = self.constraint(*x)
-        slopes = [gradient(c, node) for node in x]
-        rate: Any = 0.0
-        for slope, velocity in zip(slopes, v, strict=True):
-            rate = rate + fn.dot(slope, velocity)
-        tension = k_s * (c - rest) + k_d * rate
+        state, k_s, k_d, rest = self._parts(arguments, 2)
+        slopes, _, tension = self._pulled(state, k_s, k_d, rest)
         return [fn.scale(-tension, slope) for slope in slopes]
 
     def measure(self) -> Callable[..., Any]:
         """E = k_s (C - rest)^2 / 2."""
 
         def energy(*arguments: Any) -> Any:
-            *x, _t, k_s, _k_d, rest = arguments
+            x, k_s, _, rest = self._parts(arguments, 1)
             return 0.5 * k_s * (self.constraint(*x) - rest) ** 2
 
         return energy
+
+    @cached_property
+    def softened(self) -> Traced:
+        """df/dx and df/dv; what makes -df/dx indefinite counts `share` times.
+
+        With the tension T = k_s (C - rest) + k_d dC/dt, -df_a/dx_b = k_s dC/dx_a dC/dx_b + k_d dC/dx_a d(dC/dt)/dx_b +
+        T d2C/dx_a dx_b. The first term is positive semi-definite, and so is the last where C is convex and T > 0;
+        `share` is on all others. 1 gives the exact Jacobian, and 0 that of Choi and Ko (Stable but Responsive Cloth,
+        SIGGRAPH 2002) for springs, that of Gauss and Newton for angles.
+        """
+
+        def slopes(*arguments: Any) -> Any:
+            *given, share = arguments
+            state, k_s, k_d, rest = self._parts(given, 2)
+            x = state[0::2]
+            gradients, rate, tension = self._pulled(state, k_s, k_d, rest)
+            turns = [gradient(rate, node) for node in x]
+            bending = tension * (fn.where(tension > 0.0, 1.0, share) if self.convex else share)
+            outputs = []
+            for row in (component for along in gradients for component in along):
+                for node, along, turn in zip(x, gradients, turns, strict=True):
+                    curved = gradient(row, node)
+                    outputs += [
+                        -(row * (k_s * along[i] + share * k_d * turn[i]) + bending * curved[i]) for i in range(3)
+                    ]
+                    outputs += [-(row * k_d * along[i]) for i in range(3)]
+            return outputs
+
+        signature = {**self._signature(), "share": "scalar"}
+        return trace(slopes, signature, 18 * self.nodes**2, f"d {self.name}")
 
     @cached_property
     def traced_constraint(self) -> Traced:
@@ -254,18 +325,11 @@ class ConstraintForce(ElementForce):
         kept = {n: k for n, k in self._signature().items() if not n.startswith("v")}
 
         def parts(*arguments: Any) -> Any:
-            *x, _t, k_s, k_d, rest = arguments
+            x, k_s, k_d, rest = self._parts(arguments, 1)
             c = self.constraint(*x)
             return [c - rest, k_s, k_d, *(gradient(c, node) for node in x)]
 
         return trace(parts, kept, 3 + 3 * self.nodes, f"{self.name} constraint")
-
-    def colours(self, particles: Particles) -> Rows:
-        """Numbers of the elements, different for those that share a particle (see `coloured`), shape (e,)."""
-        rows = self.rows(particles)
-        if self._colours is None or self._colours[0] is not rows:
-            self._colours = rows, coloured(rows, len(particles))
-        return self._colours[1]
 
     @classmethod
     def at(cls, places: Array) -> Array:
@@ -293,6 +357,33 @@ class ConstraintForce(ElementForce):
     def values(self, particles: Particles, x: Array) -> Array:
         """C of each element, shape (e,)."""
         return self.at(x[self.rows(particles)])
+
+    def rests(self, particles: Particles, t: float) -> Array:
+        """C of each element without force at time t, shape (e,)."""
+        everything = np.arange(len(self.ids))
+        inputs = inputs_for(self._traced_rest, {}, {"t": float(t)}, self.settings(particles, t, everything))
+        (rest,) = self._traced_rest.columns(*inputs)
+        return np.asarray(np.broadcast_to(rest, everything.shape))
+
+    @cached_property
+    def _traced_rest(self) -> Traced:
+        names = ["t", *list(self.parameters)[2:]]
+        return trace(self.resting, dict.fromkeys(names, "scalar"), 1, f"rest of {self.name}")
+
+    def _parts(self, arguments: Sequence[Any], each: int) -> tuple[Sequence[Any], Any, Any, Any]:
+        """From a law's arguments: `each` vectors of each node, k_s, k_d, and C without force."""
+        state, (t, k_s, k_d, rest, *own) = arguments[: each * self.nodes], arguments[each * self.nodes :]
+        return state, k_s, k_d, self.resting(t, rest, *own)
+
+    def _pulled(self, state: Sequence[Any], k_s: Any, k_d: Any, rest: Any) -> tuple[list[Any], Any, Any]:
+        """dC/dx of each node, dC/dt, and the tension k_s (C - rest) + k_d dC/dt, of traced places and velocities."""
+        x, v = state[0::2], state[1::2]
+        c = self.constraint(*x)
+        slopes = [gradient(c, node) for node in x]
+        rate: Any = 0.0
+        for slope, velocity in zip(slopes, v, strict=True):
+            rate = rate + fn.dot(slope, velocity)
+        return slopes, rate, k_s * (c - rest) + k_d * rate
 
 
 def spring_force(law: Callable[..., Any]) -> type[ElementForce]:

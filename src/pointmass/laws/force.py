@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.description import Described
-from pointmass.errors import InvalidInput, about
+from pointmass.errors import InvalidInput, about, unknown
 from pointmass.laws.parameter import Parameter
 from pointmass.particles import Particles, Selection
 from pointmass.tracing.trace import Traced, vector_names
@@ -91,12 +91,14 @@ class Force(Described, ABC):
     parameters : by name; `set` changes them.
     arguments : what the force was made with, or set to since, by name.
     on : particles that it acts on; None = all.
+    selections : names of its attributes that select particles.
     enabled : whether it acts at all.
     label : its place in a scene, such as "forces.1 (drag)", for errors.
     """
 
     order: ClassVar[int] = 2
     internal: ClassVar[bool] = False
+    selections: ClassVar[tuple[str, ...]] = ("on",)
 
     def __init__(self, parameters: Sequence[Parameter] = (), on: Selection = None, enabled: bool = True) -> None:
         self.parameters = {p.name: p for p in parameters}
@@ -174,6 +176,20 @@ class Force(Described, ABC):
             raise
         self.arguments = fresh.arguments
 
+    def put(self, **values: Any) -> None:
+        """Set numbers of parameters quickly, as controllers do between steps: they are checked, and not described.
+
+        Raises
+        ------
+        InvalidInput
+            A parameter that the force does not have, a number that is not allowed, another count of numbers.
+        """
+        for name, value in values.items():
+            if name not in self.parameters:
+                raise unknown(f"parameter of {self.called}", name, self.parameters)
+            with about(self.called):
+                self.parameters[name].put(value)
+
     @property
     @abstractmethod
     def velocity_dependent(self) -> bool:
@@ -198,11 +214,14 @@ class Force(Described, ABC):
         InvalidInput
             A particle, attribute or group that does not exist, a column of another length.
         """
-        if self.on is not None:
-            rows = particles.select(self.on)
-            if not isinstance(self.on, str):
-                self.on = np.zeros(len(particles), bool)
-                self.on[rows] = True
+        for name in self.selections:
+            which = getattr(self, name)
+            if which is not None:
+                rows = particles.select(which)
+                if not isinstance(which, str):
+                    mask = np.zeros(len(particles), bool)
+                    mask[rows] = True
+                    setattr(self, name, mask)
         self._bound = particles
 
     @abstractmethod
@@ -227,13 +246,18 @@ class Force(Described, ABC):
 
     def keep(self, particles: Particles, mask: NDArray[np.bool_]) -> None:
         """Follow the removal of particles; called before it happens."""
-        if isinstance(self.on, np.ndarray):
-            self.on = self.on[mask]
+        for name, marks in self.marks():
+            setattr(self, name, marks[mask])
 
     def grow(self, particles: Particles, count: int) -> None:
         """Follow the birth of `count` particles, already added at the end."""
-        if isinstance(self.on, np.ndarray):
-            self.on = np.concatenate([self.on, np.zeros(count, bool)])
+        for name, marks in self.marks():
+            setattr(self, name, np.concatenate([marks, np.zeros(count, bool)]))
+
+    def marks(self) -> list[tuple[str, NDArray[np.bool_]]]:
+        """Its selections that are masks, with their names; others are names of groups."""
+        chosen = [(name, getattr(self, name)) for name in self.selections]
+        return [(name, which) for name, which in chosen if isinstance(which, np.ndarray)]
 
     def _arguments_with(self, values: dict[str, Any]) -> dict[str, Any]:
         """The constructor's arguments with other values of parameters."""

@@ -69,6 +69,7 @@ class Formula:
     ----------
     text : such as "-k*x".
     names : what the formula may refer to besides functions, `pi` and `e`; None = anything (checked on use).
+    gathers : further functions, of one argument, such as a mean of all particles.
 
     Raises
     ------
@@ -76,8 +77,15 @@ class Formula:
         Not a formula, a name or function that is not known, a part without names that is not finite: log(-1).
     """
 
-    def __init__(self, text: str, names: Iterable[str] | None = None, what: str = "formula") -> None:
+    def __init__(
+        self,
+        text: str,
+        names: Iterable[str] | None = None,
+        what: str = "formula",
+        gathers: Mapping[str, Callable[[Any], Any]] | None = None,
+    ) -> None:
         self.text = str(text).strip()
+        self._gathers = gathers or {}
         self.shown = self.text if len(self.text) <= 60 else f"{self.text[:57]}..."
         self.what = what
         if not self.text or len(self.text) > LONGEST:
@@ -98,7 +106,7 @@ class Formula:
         known = set(names)
         for name in sorted(self.names - known):
             inside = "" if name == self.text else f" {self.shown!r}"
-            raise unknown(f"name in {self.what}{inside}:", name, [*known, *CONSTANTS, *FUNCTIONS])
+            raise unknown(f"name in {self.what}{inside}:", name, [*known, *CONSTANTS, *FUNCTIONS, *self._gathers])
 
     def __call__(self, values: Mapping[str, Any]) -> Any:
         """The value, for numbers, arrays or symbols by name."""
@@ -110,8 +118,9 @@ class Formula:
         if depth > DEEPEST:
             raise InvalidInput(f"{self.what} nests more than {DEEPEST} operations: split it into several formulas")
         values = [self._check(part, depth + 1) for part in self._parts(node)]
-        if isinstance(node, ast.Name) and node.id in FUNCTIONS:
-            call = f"{node.id}({', '.join('xyzts'[: FUNCTIONS[node.id][1]])})"
+        if isinstance(node, ast.Name) and node.id in (FUNCTIONS.keys() | self._gathers.keys()):
+            count = 1 if node.id in self._gathers else FUNCTIONS[node.id][1]
+            call = f"{node.id}({', '.join('xyzts'[:count])})"
             raise InvalidInput(
                 f"{self.what} {self.shown!r}: {node.id} is a function, so write it with brackets: {call}"
             )
@@ -144,15 +153,17 @@ class Formula:
                 return [a, b]
             case ast.IfExp(test=c, body=a, orelse=b):
                 return [c, a, b]
+            case ast.Call(func=ast.Name(id=name), args=[inner], keywords=[]) if name in self._gathers:
+                return [inner]
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
                 if name not in FUNCTIONS:
-                    raise unknown(f"function in {self.what} {self.shown!r}:", name, FUNCTIONS)
+                    raise unknown(f"function in {self.what} {self.shown!r}:", name, [*FUNCTIONS, *self._gathers])
                 if len(arguments) != FUNCTIONS[name][1]:
                     raise InvalidInput(f"{name} in {self.what} {self.shown!r} takes {FUNCTIONS[name][1]} argument(s)")
                 return arguments
         raise InvalidInput(
             f"{self.what} {self.shown!r} may use numbers, names, + - * / % **, comparisons, `a if c else b` "
-            f"and {', '.join(FUNCTIONS)}, but not {_description(node)}"
+            f"and {', '.join(dict.fromkeys([*FUNCTIONS, *self._gathers]))}, but not {_description(node)}"
         )
 
     def _number(self, value: float) -> None:
@@ -186,7 +197,8 @@ class Formula:
                 case ast.IfExp():
                     return fn.where(*parts)
                 case ast.Call(func=ast.Name(id=name)):
-                    return FUNCTIONS[name][0](*parts)
+                    gathers = len(parts) == 1 and name in self._gathers
+                    return self._gathers[name](*parts) if gathers else FUNCTIONS[name][0](*parts)
         except (ZeroDivisionError, OverflowError):
             raise self._zero() from None
         raise AssertionError(node)

@@ -15,7 +15,9 @@ FEW = 64  # particles of which all pairs are looked at
 FAR = 2**20  # cells along an axis; what lies farther out shares the last one
 
 
-def pairs_within(x: Array, cutoff: float, box: Sequence[float] | None = None) -> tuple[Rows, Rows]:
+def pairs_within(
+    x: Array, cutoff: float, box: Sequence[float] | None = None, others: Array | None = None
+) -> tuple[Rows, Rows]:
     """All ordered pairs (i, j), i != j, that are nearer than a cut-off.
 
     Parameters
@@ -23,14 +25,18 @@ def pairs_within(x: Array, cutoff: float, box: Sequence[float] | None = None) ->
     x : positions [m], shape (n, 3).
     cutoff : [m]; at most half of the smallest side of the box.
     box : sides of a periodic box [m]; distances are those of the nearest images. None = no box.
+    others : positions of the second ones [m], shape (k, 3); i = j is then a pair like any other. None = `x`.
 
     Returns
     -------
     i, j : shape (pairs,) each, by i, and for each i by j.
     """
     found = []
-    for i, j in _few(len(x)) if len(x) <= FEW else _beside(x, cutoff, box):
-        near = (squared(x[i], nearest(x[i], x[j], box)) < x.dtype.type(cutoff) ** 2) & (i != j)
+    y = x if others is None else others
+    for i, j in _all(len(x), len(y)) if max(len(x), len(y)) <= FEW else _beside(x, y, cutoff, box):
+        near = squared(x[i], nearest(x[i], y[j], box)) < x.dtype.type(cutoff) ** 2
+        if others is None:
+            near &= i != j
         found.append((i[near], j[near]))
     i, j = (np.concatenate([pair[k] for pair in found]) for k in (0, 1))
     by_row = np.lexsort((j, i))
@@ -55,17 +61,17 @@ def squared(x1: Array, x2: Array) -> Array:
     return result
 
 
-def _few(n: int) -> Iterator[tuple[Rows, Rows]]:
-    """All pairs of n particles."""
-    yield np.repeat(np.arange(n), n), np.tile(np.arange(n), n)
+def _all(n: int, others: int) -> Iterator[tuple[Rows, Rows]]:
+    """All pairs of n particles and so many others."""
+    yield np.repeat(np.arange(n), others), np.tile(np.arange(others), n)
 
 
-def _beside(x: Array, cutoff: float, box: Sequence[float] | None) -> Iterator[tuple[Rows, Rows]]:
+def _beside(x: Array, y: Array, cutoff: float, box: Sequence[float] | None) -> Iterator[tuple[Rows, Rows]]:
     """Pairs whose cells are the same or touch, one direction after the other."""
     size = cutoff * (1 + 1e-5)  # a trifle larger, whatever is rounded
     counts = np.full(3, FAR) if box is None else np.clip(np.asarray(box) // size, 1, FAR).astype(np.int64)
     cells = _cells(x, size, box, counts)
-    key = _key(cells)
+    key = _key(_cells(y, size, box, counts))
     order = np.argsort(key, kind="stable")
     ordered = key[order]
     for offset in product(*(range(-1, 2) if count > 2 else range(count) for count in counts)):

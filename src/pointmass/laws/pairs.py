@@ -38,6 +38,8 @@ class PairForce(Force):
     per_particle : parameters that each particle has its own of; the law gets them as pairs (p1, p2).
     box : sides of a periodic box [m], or None. Each pair is taken at its nearest images: x2 is moved by whole sides
         before the law sees it. Positions themselves are not wrapped.
+    by : particles that act on those of `on`: particle 2 of each pair; None = those of `on`. What acts one way only
+        has no energy.
 
     Notes
     -----
@@ -49,11 +51,18 @@ class PairForce(Force):
     finish: ClassVar[Callable[..., Any] | None] = None
     potential: ClassVar[Callable[..., Any] | None] = None
     per_particle: ClassVar[tuple[str, ...]] = ()
+    selections: ClassVar[tuple[str, ...]] = ("on", "by")
 
     def __init__(
-        self, parameters: Sequence[Parameter], on: Selection = None, enabled: bool = True, box: Box | None = None
+        self,
+        parameters: Sequence[Parameter],
+        on: Selection = None,
+        enabled: bool = True,
+        box: Box | None = None,
+        by: Selection = None,
     ) -> None:
         super().__init__(parameters, on, enabled)
+        self.by = by
         self.box = None if box is None else tuple(float(side) for side in finite_array("box", box, (3,)))
         if self.box is not None and min(self.box) <= 0:
             raise InvalidInput(f"box = {box} is not allowed: its sides must be greater than 0 [m]")
@@ -82,7 +91,7 @@ class PairForce(Force):
     @cached_property
     def traced_potential(self) -> Traced | None:
         """The potential energy of a pair as a program."""
-        if self.potential is None:
+        if self.potential is None or self.by is not None:
             return None
         return trace(self._paired(self.potential), self._signature(), 1, f"{self.name} potential")
 
@@ -117,10 +126,10 @@ class PairForce(Force):
         _ = self.traced, self.traced_finish
 
     def add_forces(self, particles: Particles, t: Any, x: Array, v: Array, f: Array) -> None:
-        rows = particles.select(self.on)
+        rows, others = self.ends(particles)
         sums = np.zeros((len(rows), len(self.traced.program.outputs)), x.dtype)
-        for i, j in self._pairs(particles, x, rows):
-            for k, part in enumerate(self._values(self.traced, particles, t, x, v, rows[i], rows[j])):
+        for i, j in self._pairs(particles, x):
+            for k, part in enumerate(self._values(self.traced, particles, t, x, v, rows[i], others[j])):
                 if part.ndim == 2:
                     sums[i[:, 0], k] = part.sum(axis=1)
                 else:
@@ -131,20 +140,21 @@ class PairForce(Force):
             f[rows] += self._finished(self.traced_finish, particles, t, x, v, rows, sums)
 
     def add_jacobian(self, particles: Particles, t: Any, x: Array, v: Array, blocks: Blocks) -> None:
-        rows = particles.select(self.on)
-        if self.reach(particles) is None and len(rows) > LARGEST_JACOBIAN:
+        rows, others = self.ends(particles)
+        coupled = max(len(rows), len(others))
+        if self.reach(particles) is None and coupled > LARGEST_JACOBIAN:
             raise InvalidInput(
-                f"{self.name} couples {len(rows)} particles, and implicit solvers take at most {LARGEST_JACOBIAN}: "
+                f"{self.name} couples {coupled} particles, and implicit solvers take at most {LARGEST_JACOBIAN}: "
                 "use leapfrog or dopri5"
             )
         count = len(self.traced.program.outputs)
-        found = [(np.ravel(a), np.ravel(b)) for i, j in self._pairs(particles, x, rows) for a, b in [_both(i, j)]]
+        found = [(np.ravel(a), np.ravel(b)) for i, j in self._pairs(particles, x) for a, b in [_both(i, j)]]
         i, j = (np.concatenate([pair[k] for pair in found]) if found else rows[:0] for k in (0, 1))
-        parts = self._values(self._jacobian, particles, t, x, v, rows[i], rows[j])
+        parts = self._values(self._jacobian, particles, t, x, v, rows[i], others[j])
         values = matrix(parts, len(i), x.dtype).reshape(-1, count, 2, 2, 3)  # sum, node, x|v, axis
         if self.finish is not None:
             sums = np.zeros((len(rows), count), x.dtype)
-            for k, part in enumerate(self._values(self.traced, particles, t, x, v, rows[i], rows[j])):
+            for k, part in enumerate(self._values(self.traced, particles, t, x, v, rows[i], others[j])):
                 np.add.at(sums[:, k], i, part)
             slopes = self._finished(self._finish_jacobian, particles, t, x, v, rows, sums)
             slopes = slopes.reshape(len(rows), 3, count + 6)
@@ -152,26 +162,31 @@ class PairForce(Force):
             blocks.add(rows, rows, own[:, :, 0], own[:, :, 1])
             values = np.einsum("pas,psnqb->panqb", slopes[i, :, :count], values)
         blocks.add(rows[i], rows[i], values[:, :, 0, 0], values[:, :, 0, 1])
-        blocks.add(rows[i], rows[j], values[:, :, 1, 0], values[:, :, 1, 1])
+        blocks.add(rows[i], others[j], values[:, :, 1, 0], values[:, :, 1, 1])
 
     def energy(self, particles: Particles, t: float, x: Array, v: Array) -> float | None:
         if self.traced_potential is None:
             return None
         rows = particles.select(self.on)
         total = 0.0
-        for i, j in self._pairs(particles, x, rows):
+        for i, j in self._pairs(particles, x):
             (part,) = self._values(self.traced_potential, particles, t, x, v, rows[i], rows[j])
             total += float(part.sum(dtype=np.float64))
         return 0.5 * total
 
     def links(self, particles: Particles) -> Rows:
-        rows = particles.select(self.on)
+        rows = np.union1d(*self.ends(particles))
         return np.stack([rows[:-1], rows[1:]], axis=1)
 
+    def ends(self, particles: Particles) -> tuple[Rows, Rows]:
+        """Rows that the force acts on, and those that act on them."""
+        rows = particles.select(self.on)
+        return rows, rows if self.by is None else particles.select(self.by)
+
     def partners(self, particles: Particles, row: int) -> list[int]:
-        x = particles.x
-        same = (x[particles.select(self.on)] == x[row]).all(axis=1)
-        return [int(r) for r in particles.select(self.on)[same] if r != row]
+        _, others = self.ends(particles)
+        same = (particles.x[others] == particles.x[row]).all(axis=1)
+        return [int(r) for r in others[same] if r != row]
 
     def keep(self, particles: Particles, mask: Any) -> None:
         super().keep(particles, mask)
@@ -211,16 +226,16 @@ class PairForce(Force):
 
         return call
 
-    def _pairs(self, particles: Particles, x: Array, rows: Rows) -> Iterator[tuple[Rows, Rows]]:
-        """Ordered pairs of places in `rows`, block by block: i of shape (k, 1) with all j (1, n), or (k,) each."""
+    def _pairs(self, particles: Particles, x: Array) -> Iterator[tuple[Rows, Rows]]:
+        """Ordered pairs of places in `ends`, block by block: i of shape (k, 1) with all j (1, n), or (k,) each."""
         reach = self.reach(particles)
+        rows, others = self.ends(particles)
         if reach is None:
-            size = max(1, PAIRS_AT_ONCE // max(1, len(rows)))
-            everybody = np.arange(len(rows))
+            size = max(1, PAIRS_AT_ONCE // max(1, len(others)))
             for start in range(0, len(rows), size):
-                yield everybody[start : start + size, None], everybody[None, :]
+                yield np.arange(start, min(start + size, len(rows)))[:, None], np.arange(len(others))[None, :]
         elif reach > 0:
-            i, j = pairs_within(x[rows], reach, self.box)
+            i, j = pairs_within(x[rows], reach, self.box, None if self.by is None else x[others])
             for start in range(0, len(i), PAIRS_AT_ONCE):
                 yield i[start : start + PAIRS_AT_ONCE], j[start : start + PAIRS_AT_ONCE]
 
@@ -289,7 +304,7 @@ def pair_force(
     -------
     type
         A class of forces; its constructor takes the law's parameters by name, `cutoff`, `box` (sides of a periodic
-        box), `on` and `enabled`.
+        box), `on`, `by` (particles that act on those of `on`; None = those of `on`) and `enabled`.
 
     Examples
     --------
@@ -327,6 +342,7 @@ def _class_of(
         cutoff: float | None = cutoff,
         box: Box | None = None,
         on: Selection = None,
+        by: Selection = None,
         enabled: bool = True,
         **given: Any,
     ) -> None:
@@ -335,7 +351,7 @@ def _class_of(
             parameters.append(cut_off(cutoff))
         elif "cutoff" in _names(law):
             raise InvalidInput(f"law {law_name(law)!r} needs a cutoff [m]")
-        PairForce.__init__(self, parameters, on, enabled, box)
+        PairForce.__init__(self, parameters, on, enabled, box, by)
 
     body = {"__init__": __init__, "law": staticmethod(law), "per_particle": per_particle, "internal": False}
     body |= {n: staticmethod(f) for n, f in (("finish", finish), ("potential", potential)) if f is not None}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pointmass.errors import InvalidInput, finite_array, floats, number, shown, whole_number
 from pointmass.laws.formula import Formula
-from pointmass.particles import Particles
+from pointmass.particles import Particles, read_only
 from pointmass.tracing.program import flatten
 from pointmass.tracing.trace import Traced, trace
 
@@ -41,7 +41,7 @@ class Component:
         elif callable(value):
             self.value = trace(value, {"t": "scalar"}, 1, name)
         elif _ndim(value) == 1:
-            self.value = finite_array(name, value, (None,))
+            self.value = read_only(finite_array(name, value, (None,)).copy())  # kernels need not look for changes
             self._check(self.value)
         else:
             self.value = number(name, value, unit=unit, **bounds)
@@ -156,17 +156,56 @@ class Parameter:
             if c.formula is not None:
                 c.formula.restrict(["t", *particles.columns])
 
+    def put(self, values: Any) -> None:
+        """Have other numbers, which are checked like those before: one, or one for each thing that has one.
+
+        Raises
+        ------
+        InvalidInput
+            A number that is not allowed, another count than before, a parameter that is a function of t or a vector.
+        """
+        (component, *more) = self.components
+        if more or isinstance(component.value, Traced):
+            raise InvalidInput(f"{self.name} cannot be controlled: it is a vector or a function of t")
+        old, array = component.value, np.asarray(values, np.float64)
+        if array.ndim > 1 or (isinstance(old, np.ndarray) and array.ndim and array.shape != old.shape):
+            raise InvalidInput(f"{self.name} takes one number or {np.shape(old)}, not an array of shape {array.shape}")
+        component._check(array)
+        if isinstance(old, np.ndarray):
+            array = np.broadcast_to(array, old.shape)
+        component.value = read_only(array.copy()) if array.ndim else float(array)
+
     def twin(self) -> Parameter:
         """The same parameter once more, whose columns can follow other particles."""
         result = copy(self)
         result.components = [copy(c) for c in self.components]
         return result
 
-    def keep(self, mask: NDArray[np.bool_]) -> None:
-        """Keep the rows of a mask in columns of numbers."""
+    def keep(self, rows: NDArray[np.bool_] | Rows) -> None:
+        """Keep some rows of columns of numbers: those of a mask, or in any order, some of them more than once."""
         for c in self.components:
             if isinstance(c.value, np.ndarray):
-                c.value = c.value[mask]
+                c.value = read_only(c.value[rows])
+
+    def each(self, count: int, what: str) -> None:
+        """Have a number of its own for each of `count` things, though it may be the same for all so far.
+
+        Raises
+        ------
+        InvalidInput
+            It is a function of t.
+        """
+        for c in self.components:
+            if isinstance(c.value, Traced):
+                raise InvalidInput(f"{c.name} of {what} is not allowed to be a function of t: use numbers")
+            if not isinstance(c.value, np.ndarray):
+                c.value = read_only(np.full(count, c.value))
+
+    def scale(self, factors: NDArray[np.floating[Any]]) -> None:
+        """Multiply columns of numbers by factors, shape (rows,)."""
+        for c in self.components:
+            if isinstance(c.value, np.ndarray):
+                c.value = read_only(c.value * factors)
 
     def _parts(self, value: Any) -> list[Any]:
         if not self.vector:

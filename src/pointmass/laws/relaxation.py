@@ -15,15 +15,45 @@ from typing import Any
 
 import numpy as np
 
-from pointmass.laws.colouring import colour_starts
+from pointmass.laws.colouring import colour_starts, coloured
 from pointmass.laws.elements import ConstraintForce
-from pointmass.laws.force import Array, clock, inputs_for, matrix
+from pointmass.laws.force import Array, Force, Rows, clock, inputs_for, matrix
+from pointmass.laws.stencils import SMALLEST, grid
 from pointmass.particles import Particles
 from pointmass.tracing import functions as fn
 
 
+def colours(forces: Sequence[ConstraintForce], particles: Particles, islands: Rows) -> list[Rows]:
+    """Numbers of the elements of each force, different for those that share a particle: the order in which they move.
+
+    Elements of an island that is a grid take turns by rows and columns, stencil by stencil; see `coloured` for others.
+
+    Parameters
+    ----------
+    islands : of each particle, shape (n,).
+    """
+    enabled = [force for force in forces if force.enabled]
+    result = [np.full(len(force.ids), -1, np.intp) for force in forces]
+    size = np.bincount(islands, minlength=1)
+    by_island = np.argsort(islands, kind="stable")
+    ends = np.cumsum(size)
+    for island in np.flatnonzero(size >= SMALLEST**2):
+        found = grid(enabled, particles, by_island[ends[island] - size[island] : ends[island]])
+        below: dict[Force, int] = dict.fromkeys(forces, 0)  # colours of the stencils before this one
+        for stencil in [] if found is None else found.stencils:
+            own, force = stencil.colours(), stencil.force
+            place = next(k for k, other in enumerate(forces) if other is force)
+            result[place][stencil.own] = below[force] + own
+            below[force] += int(own.max()) + 1
+    for force, mine in zip(forces, result, strict=True):
+        others = mine < 0
+        mine[others] = coloured(force.rows(particles)[others], len(particles))
+    return result
+
+
 def relax(
     forces: Sequence[ConstraintForce],
+    orders: Sequence[Rows],
     particles: Particles,
     t: Any,
     h: Array,
@@ -36,11 +66,12 @@ def relax(
 
     Parameters
     ----------
+    orders : colours of the elements of each force.
     t, h : end of the step, a number or one for each particle, and its length, shape (n,) [s].
     x, rise : positions at the start, and how far they come [m], shape (n, 3).
     project : directions in which each particle is free, shape (n, 3, 3); None = all.
     """
-    families = [_Family(force, particles, t, h) for force in forces]
+    families = [_Family(force, own, particles, t, h) for force, own in zip(forces, orders, strict=True)]
     for _ in range(sweeps):
         for family in families:
             family.sweep(particles.w, x, rise, project)
@@ -49,12 +80,11 @@ def relax(
 class _Family:
     """The elements of a force in the order of their colours, with the impulses that they have noted so far."""
 
-    def __init__(self, force: ConstraintForce, particles: Particles, t: Any, h: Array) -> None:
+    def __init__(self, force: ConstraintForce, own: Rows, particles: Particles, t: Any, h: Array) -> None:
         self.force = force
         rows = force.rows(particles)
-        colours = force.colours(particles)
-        order = np.argsort(colours, kind="stable")
-        self.starts = colour_starts(colours[order])
+        order = np.argsort(own, kind="stable")
+        self.starts = colour_starts(own[order])
         self.rows, now = rows[order], clock(t, rows[order, 0])
         law = force.traced_constraint
         count = len(order)

@@ -152,7 +152,7 @@ def law_parameters(law: Callable[..., Any], fixed: Sequence[str]) -> dict[str, A
             f"law {law_name(law)!r} must take ({', '.join(fixed)}) and then its parameters by name, without * and **, "
             f"not ({', '.join(map(str, names.values()))})"
         )
-    for taken in {"on", "enabled", "pairs", "elements", "box"} & set(own):
+    for taken in {"on", "by", "enabled", "pairs", "elements", "box"} & set(own):
         raise InvalidInput(f"law {law_name(law)!r} cannot have a parameter {taken!r}: every force has that; rename it")
     return {n: names[n].default for n in own}
 

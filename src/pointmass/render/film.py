@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import re
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
@@ -20,6 +19,7 @@ from pointmass.frame import Camera, Frame
 from pointmass.render.camera import fit_camera
 from pointmass.render.image import checked_size, image
 from pointmass.render.style import Style
+from pointmass.sequences import is_sequence
 
 Picture = NDArray[np.uint8]
 
@@ -28,7 +28,6 @@ LIMITED = 1  # luma from 16 to 235
 GIF_TICKS = 100  # a GIF counts time in hundredths of a second
 SLOWEST, FASTEST = 0.001, 1000  # frames per second
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # no room for a film
-NUMBERED = re.compile(r"[^%]*%(0[1-9])?d[^%]*")  # names of a sequence
 
 
 class Writer(Protocol):
@@ -204,8 +203,8 @@ def check_write(
     suffix = target.suffix.lower()
     if suffix not in WRITERS:
         raise unknown("kind of picture or film", target.suffix, WRITERS)
-    if suffix == ".png" and not (is_single(target) or NUMBERED.fullmatch(target.name)):
-        raise InvalidInput(f"cannot write {target.name!r}: a sequence needs one number, such as x_%04d.png")
+    if suffix == ".png":
+        is_sequence(target)
     width, height = size = checked_size(size)
     if suffix in EVEN and (width % 2 or height % 2):
         near = f"{width + width % 2}x{height + height % 2}"

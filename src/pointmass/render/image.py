@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pointmass.colors import srgb
 from pointmass.errors import InvalidInput
 from pointmass.frame import Arrows, Camera, Curves, Drawable, Frame, Points, Segments
 from pointmass.render.balls import EMPTY as NO_BALLS
@@ -259,8 +260,7 @@ def _offsets(samples: int) -> F32:
 def _srgb_curve() -> F32:
     """sRGB bytes (not rounded) of linear light, at equal steps of its square root."""
     light = np.linspace(0.0, 1.0, 4096) ** 2
-    curve: F64 = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1.0 / 2.4) - 0.055)
-    result: F32 = (255.0 * curve).astype(np.float32)
+    result: F32 = (255.0 * srgb(light)).astype(np.float32)
     return result
 
 

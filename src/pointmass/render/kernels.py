@@ -18,12 +18,13 @@ import math
 
 import numpy as np
 
+from pointmass.kernels_base import inner
 from pointmass.render.balls import HALO as _HALO
 from pointmass.render.balls import MIN_BALL as _MIN_BALL
 from pointmass.render.balls import MIN_GLOW as _MIN_GLOW
 from pointmass.render.capsules import GLOW_REACH as _REACH
 from pointmass.render.capsules import MIN_GLOW as _MIN_LINE
-from pointmass.render.inner import bare, inner, kernel
+from pointmass.render.inner import bare, kernel
 from pointmass.render.kernels_shade import (
     AREA,
     BAND,

@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from pointmass.render.inner import bare, inner, kernel
+from pointmass.kernels_base import inner
+from pointmass.render.inner import bare, kernel
 
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)

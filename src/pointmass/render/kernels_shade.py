@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from pointmass.render.inner import inner
+from pointmass.kernels_base import inner
 
 TILE = 128  # columns of a tile, and
 BAND = 16  # its rows; both even, for the bloom works at half the size

@@ -7,7 +7,8 @@ import math
 
 import numpy as np
 
-from pointmass.render.inner import bare, inner, kernel
+from pointmass.kernels_base import inner
+from pointmass.render.inner import bare, kernel
 
 FAR = np.float32(np.inf)
 ZERO = np.float32(0.0)

@@ -12,7 +12,7 @@ import numpy as np
 
 from pointmass.bodies import Body
 from pointmass.errors import InvalidInput, PointmassError, number, unknown
-from pointmass.forces import Springs
+from pointmass.forces import Springs, Volumes
 from pointmass.frame import Frame
 from pointmass.scene import Scene
 from pointmass.solvers.base import Solver
@@ -127,21 +127,22 @@ def substeps(solver: Solver, stiffness: float, damping: float) -> int:
 
 
 def stiffest(body: Body) -> tuple[float, float]:
-    """Bounds of the stiffness and the damping of the springs of a body [1/s^2, 1/s], for `substeps`.
+    """Bounds of the stiffness and the damping of the springs and volumes of a body [1/s^2, 1/s], for `substeps`.
 
-    A spring adds at most 2 k |x|^2 of each of its ends to x K x, whichever way it points and as long as it is not
-    stretched beyond all measure; so no frequency^2 is above the largest sum of 2 k / m over the springs of a particle,
-    however the body is folded.
+    An element with k nodes adds at most k k_s |dC/dx|^2 |x|^2 of each of them to x K x: for a spring 2 k_s |x|^2 of
+    each end, whichever way it points and as long as it is not stretched beyond all measure. So no frequency^2 is above
+    the largest sum of that over m at a particle, however a body of springs is folded; volumes are taken as they are.
     """
     p = body.particles
     total = np.zeros((2, len(p)))
     for force in body.forces:
-        if isinstance(force, Springs):
+        if isinstance(force, (Springs, Volumes)):
             rows = force.rows(p)
             settings = force.settings(p, 0.0, np.arange(len(rows)))
+            slope = np.ones(rows.shape) if isinstance(force, Springs) else (force.slopes(p.x[rows]) ** 2).sum(axis=2)
             for k, name in enumerate(("k_s", "k_d")):
-                value = np.broadcast_to(settings[name][0], len(rows))
-                total[k] += np.bincount(rows.ravel(), np.repeat(2 * value, 2), len(p))
+                value = force.nodes * np.broadcast_to(settings[name][0], len(rows))[:, None] * slope
+                total[k] += np.bincount(rows.ravel(), value.ravel(), len(p))
     stiffness, damping = (total / p.m).max(axis=1)
     return float(stiffness), float(damping)
 

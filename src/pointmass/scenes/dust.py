@@ -52,7 +52,7 @@ class Dust(ShippedScene):
     wander: float = knob(0.6, "how far the whirl strays from a straight way", unit="m", low=0, high=20)
     turbulence: float = knob(0.45, "root mean square speed of small whirls", unit="m/s", low=0, high=20)
     friction: float = knob(2.5, "of the ground; above 1, grains cling to it", low=0, high=10)
-    gravity: float = knob(9.81, "gravity, downwards", unit="m/s^2", low=0.01, high=1000)
+    gravity: float = knob(9.81, "gravity, downwards", unit="m/s^2", low=0.01, high=100)
 
     @property
     def drag(self) -> float:

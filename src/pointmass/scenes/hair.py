@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pointmass.bodies import Body, hair, points
 from pointmass.bodies.hair import YOUNG
 from pointmass.collisions import Capsule, Sphere
+from pointmass.errors import InvalidInput
 from pointmass.forces import Cushion, Flow, Gravity, Wind
 from pointmass.frame import Camera, Frame
 from pointmass.look import Look
@@ -42,13 +43,24 @@ TONES = {
     "blond": ("#9a7640", "#f4deaa"),
     "red": ("#5c1e0c", "#cf6a30"),
 }
+LINK = 0.05  # longest link of a strand [m]
 STRETCH = 25  # times the load of a strand that would double its length: 4% at rest, twice that in a jerk
+ROOM = {"straight": 0.75, "wavy": 0.5, "curly": 0.75}  # part of the largest safe step that is taken
 START = 0.6  # in which the head begins to turn [s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class HairScene(ShippedScene):
-    """A head turns from side to side, its hair swings after it, and gusts of wind go through it."""
+    """A head turns from side to side, its hair swings after it, and gusts of wind go through it.
+
+    Links are straight, and one of more than 5 cm whose ends lie on the head leads through it: so a strand has at least
+    6 points, and a longer one more.
+
+    Raises
+    ------
+    InvalidInput
+        A value that a parameter does not allow, too few points for the length of a strand.
+    """
 
     name = "hair"
     presets: ClassVar[dict[str, dict[str, Any]]] = {
@@ -58,7 +70,7 @@ class HairScene(ShippedScene):
     }
 
     strands: int = knob(300, "strands that are simulated", low=3, high=20000)
-    points: int = knob(20, "points of a strand", low=4, high=64)
+    points: int = knob(20, "points of a strand", low=6, high=64)
     children: int = knob(20, "strands drawn between each of them and its neighbours", low=0, high=100)
     style: str = knob("straight", "shape of a strand at rest", choices=("straight", "wavy", "curly"))
     length: float = knob(0.24, "length of a strand", unit="m", low=0.08, high=0.5)
@@ -69,6 +81,14 @@ class HairScene(ShippedScene):
     wind: float = knob(1.0, "mean speed of the wind", unit="m/s", low=0, high=8)
     air: float = knob(0.3, "time in which air takes hair along", unit="s", low=0.1, high=100)
     gravity: float = knob(9.81, "gravity, downwards", unit="m/s^2", low=0, high=50)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.length > LINK * (self.points - 1):
+            raise InvalidInput(
+                f"points = {self.points} is not allowed: the links of a strand of {self.length:g} m would lead through"
+                f" the head: give at least {math.ceil(self.length / LINK) + 1} points, or shorter strands"
+            )
 
     def build(self) -> Scene:
         """A head of balls, hair on its scalp, a soft layer on what hair falls against."""
@@ -171,10 +191,13 @@ class HairScene(ShippedScene):
         return {"straight": None, "wavy": min(10.0, most), "curly": min(16.0, most)}[self.style]
 
     def _substeps(self) -> int:
-        """Steps in a sixtieth of a second, from a few strands: with some room, as they will bend otherwise."""
+        """Steps in a sixtieth of a second, from a few strands: with some room, as they will bend otherwise.
+
+        What holds torsion grows with the bend, and the more so the less a strand is bent at rest.
+        """
         few = self._wig(4)
         safe = ParticleSystem(few.particles, few.forces).stability(SymplecticEuler()).largest_safe_dt
-        return max(8, math.ceil(1 / 60 / (0.75 * safe)))
+        return max(8, math.ceil(1 / 60 / (ROOM[self.style] * safe)))
 
     def _angle_formula(self) -> str:
         turn, rate = math.radians(self.turn), 2 * math.pi / self.period

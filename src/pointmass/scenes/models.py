@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pointmass.collisions import Mesh
+from pointmass.errors import InvalidInput
+from pointmass.meshes import as_mesh
+
 Model = tuple[NDArray[np.float64], NDArray[np.int64]]  # vertices [m], shape (n, 3), and faces, shape (k, 3)
 TIERS, POINTS = 7, 7  # of branches, and the points of each
 HOLLOW = 0.86  # of the radius between two points, relative to theirs
+TABLE_SIDES = 48
+TABLE = (  # radii and heights of a table from the middle of its foot to the middle of its top, relative to its height
+    *((0.0, 0.0), (0.38, 0.0), (0.38, 0.02), (0.3, 0.05), (0.07, 0.1), (0.05, 0.5), (0.07, 0.9), (0.5, 0.94)),
+    *((0.54, 0.955), (0.55, 0.97), (0.54, 0.987), (0.52, 1.0), (0.0, 1.0)),
+)
 
 
 def fir(height: float, root: float, steep: float = 0.9) -> Model:
@@ -51,6 +61,43 @@ def house(height: float, root: float, steep: float = 0.7) -> Model:
     side, x = 0.1 * height, 0.35 * height
     square = [(x - side, 0.5 * height), (x + side, 0.5 * height), (x + side, 1.12 * height), (x - side, 1.12 * height)]
     return together(body, moved(_prism(square, (x, height), side), (0.0, 0.0, -0.3 * height)))
+
+
+def table(height: float) -> Model:
+    """A round table on one leg.
+
+    Parameters
+    ----------
+    height : of its top [m]; its radius is 0.55 of that.
+    """
+    profile = np.array(TABLE)
+    around = np.ones(TABLE_SIDES)
+    vertices, faces = _revolved(height * profile[:, 0], height * profile[:, 1], around)
+    return np.round(vertices, 4), faces
+
+
+def of_file(parameter: str, path: str, tall: float, foot: float = 0.0, **surface: Any) -> Mesh:
+    """The mesh of a file, scaled, with its middle at x = z = 0.
+
+    Parameters
+    ----------
+    parameter : that names the file, for messages.
+    tall : height that it gets [m].
+    foot : height at which it stands [m].
+    surface : such as its friction.
+
+    Raises
+    ------
+    InvalidInput
+        It cannot be read, or is flat.
+    """
+    corners = as_mesh(path).vertices
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    if not high[1] > low[1]:
+        raise InvalidInput(f"{parameter} = {path!r} is not allowed: the mesh is flat, and has no height to scale")
+    scale = float(tall / (high[1] - low[1]))
+    x, y, z = (-scale * p for p in (0.5 * (low[0] + high[0]), low[1], 0.5 * (low[2] + high[2])))
+    return Mesh(path, scale=scale, shift=(float(x), float(y) + foot, float(z)), **surface)
 
 
 def moved(model: Model, shift: ArrayLike) -> Model:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -19,6 +20,7 @@ from pointmass.solvers import SymplecticEuler
 
 AIR, GRAVITY = 293.0, 9.81  # its temperature [K]; [m/s^2]
 PUFF = 1e-3  # mass of a puff [kg]
+CLEARANCE = 0.98  # from the fire to the ball [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,13 +51,13 @@ class Smoke(ShippedScene):
 
     def build(self) -> Scene:
         """A fire below a ball; with smoke that sinks, above it."""
-        way = 1.0 if self.heat >= 0 else -1.0
-        solid = Sphere((0.08, way * 1.3, 0.0), self.ball, restitution=0.0, friction=0.0)
+        way = self._way()
+        solid = Sphere(self._middle(), self.ball, restitution=0.0, friction=0.0)
         air = CurlNoise(self.whirl, self.turbulence, self.change, octaves=2, seed=4, around=[solid])
         return Scene(
             name=self.name,
             summary=self.summary(),
-            dt=1 / 60,
+            dt=1 / 60 / math.ceil(self.response / 60),  # at most as long as the air needs to take a puff along
             frames=420,
             dtype="float32",
             solver=SymplecticEuler(),
@@ -87,11 +89,19 @@ class Smoke(ShippedScene):
             ),
         )
 
+    def _way(self) -> float:
+        """Of the smoke: up or down."""
+        return 1.0 if self.heat >= 0 else -1.0
+
+    def _middle(self) -> tuple[float, float, float]:
+        """Of the ball: however large, it leaves the fire free."""
+        return 0.08, self._way() * (CLEARANCE + self.ball), 0.0
+
     def check(self, frames: Sequence[Frame]) -> None:
         """No smoke is in the ball; warm smoke rises, cold smoke sinks; in the end there are rate x lifetime puffs."""
-        way = 1.0 if self.heat >= 0 else -1.0
+        way = self._way()
         last = frames[-1]
-        gap = np.linalg.norm(last.positions - np.array((0.08, way * 1.3, 0.0)), axis=1) - self.ball
+        gap = np.linalg.norm(last.positions - np.array(self._middle()), axis=1) - self.ball
         deepest = float(gap.min(initial=0.0))
         expect(deepest > -1e-3, f"smoke is {-deepest:.2g} m inside the ball")
         lift = abs(self.heat) * GRAVITY / AIR / self.response  # speed of the rise at first [m/s]

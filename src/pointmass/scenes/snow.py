@@ -13,14 +13,12 @@ from numpy.typing import NDArray
 from pointmass.bodies import scatter
 from pointmass.collisions import HeightField, Mesh
 from pointmass.emitters import BoxEmitter
-from pointmass.errors import InvalidInput
 from pointmass.forces import Flutter, Gravity, Gust, Wind
 from pointmass.frame import Camera, Frame
 from pointmass.look import Look
-from pointmass.meshes import as_mesh
 from pointmass.scene import Scene
 from pointmass.scenes.base import ShippedScene, expect, knob
-from pointmass.scenes.models import Model, fir, house, moved, together, turned
+from pointmass.scenes.models import Model, fir, house, moved, of_file, together, turned
 from pointmass.solvers import SymplecticEuler
 from pointmass.tracing.noise import noise
 from pointmass.zones import HalfSpaceZone
@@ -77,16 +75,7 @@ class Snow(ShippedScene):
     def standing(self) -> Mesh:
         """What stands on the hills: a house and firs, or the mesh of a file, with its middle at x = z = 0."""
         if self.model:
-            corners = as_mesh(self.model).vertices
-            low, high = corners.min(axis=0), corners.max(axis=0)
-            if not high[1] > low[1]:
-                raise InvalidInput(
-                    f"model = {self.model!r} is not allowed: the mesh is flat, and has no height to scale"
-                )
-            scale = float(self.tall / (high[1] - low[1]))
-            x, y, z = (-scale * p for p in (0.5 * (low[0] + high[0]), low[1], 0.5 * (low[2] + high[2])))
-            foot = float(self._height(0.0, 0.0))
-            return Mesh(self.model, scale=scale, shift=(float(x), float(y) + foot, float(z)), **self._surface)
+            return of_file("model", self.model, self.tall, float(self._height(0.0, 0.0)), **self._surface)
         return Mesh(self._village(), **self._surface)
 
     @property

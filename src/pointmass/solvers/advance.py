@@ -27,7 +27,7 @@ class Stats:
     Attributes
     ----------
     steps : steps of the solver, all islands at once, trials that were rejected included.
-    rejected : trials that were rejected, counted for each island.
+    rejected : trials that were rejected, or implicit ones whose equations were not solved, counted for each island.
     evaluations : of deriv_eval, for all islands at once.
     iterations : of Newton's method, counted for each island.
     cg_iterations : of conjugate gradients, counted for each island.
@@ -153,6 +153,7 @@ class _Run:
         length: Clock = float(h[0]) if common else h[self.islands]
         trial = self.solver.step(self.system, t, self.y, length, self.memory)
         self.stats.steps += 1
+        self.stats.rejected += trial.rejected
         self.stats.iterations += trial.iterations
         self.stats.cg_iterations += trial.cg_iterations
         return trial
@@ -232,8 +233,8 @@ class _Counted:
         self.evaluations += 1
         return self._system.deriv_eval(t, y)
 
-    def jacobian(self, t: Clock, y: Array) -> Any:
-        return self._system.jacobian(t, y)
+    def jacobian(self, t: Clock, y: Array, share: Array | None = None) -> Any:
+        return self._system.jacobian(t, y, share)
 
     def external(self, t: Clock, y: Array) -> Array:
         self.evaluations += 1

@@ -51,8 +51,14 @@ class System(Protocol):
     def deriv_eval(self, t: Clock, y: Array) -> Array:
         """dy/dt, shape (dim,): a new array, a pure function of (t, y)."""
 
-    def jacobian(self, t: Clock, y: Array) -> Any:
-        """d(deriv_eval)/dy, a scipy.sparse CSR array of shape (dim, dim)."""
+    def jacobian(self, t: Clock, y: Array, share: Array | None = None) -> Any:
+        """d(deriv_eval)/dy, a scipy.sparse CSR array of shape (dim, dim).
+
+        Parameters
+        ----------
+        share : of what may make the matrix of an implicit step indefinite, shape (dim,); None = all of it. A system
+            that knows no such part gives all of it.
+        """
 
     def external(self, t: Clock, y: Array) -> Array:
         """dy/dt without the elements that `relaxed` stands for, shape (dim,)."""
@@ -81,6 +87,7 @@ class Step:
     error : estimate of the local error, shape (dim,), from methods that have one.
     iterations : linear systems that Newton's method solved, counted for each island; 0 for explicit methods.
     cg_iterations : of conjugate gradients, counted for each island.
+    rejected : trials whose equations were not solved, so that the step was divided, counted for each island.
     dense : theta in [0, 1] (a number or an array of shape (dim,)) -> state at t + theta h.
     """
 
@@ -93,6 +100,7 @@ class Step:
     error: Array | None = None
     iterations: int = 0
     cg_iterations: int = 0
+    rejected: int = 0
 
 
 class Solver(Described, ABC):
@@ -105,6 +113,7 @@ class Solver(Described, ABC):
     evaluations : of deriv_eval for one step (implicit methods: at least).
     implicit : whether resting contact is that of the start of a step.
     relaxes : whether it asks for `System.external` and `relaxed` instead of `deriv_eval`.
+    moves_masses : whether it solves x'' = f/m only, so that it cannot solve a flow.
     """
 
     name: ClassVar[str]
@@ -112,6 +121,7 @@ class Solver(Described, ABC):
     evaluations: ClassVar[int]
     implicit: ClassVar[bool] = False
     relaxes: ClassVar[bool] = False
+    moves_masses: ClassVar[bool] = False
 
     @abstractmethod
     def step(self, system: System, t: Clock, y: Array, h: Clock, memory: Memory) -> Step:
@@ -124,6 +134,17 @@ class Solver(Described, ABC):
         Diverged
             The equations of an implicit step could not be solved.
         """
+
+    def residual(self, system: System, t: Clock, y: Array, h: Clock, memory: Memory, y1: Array) -> Array | None:
+        """What a step to y1 leaves of the equations that it had to solve; the other arguments are those of `step`.
+
+        Returns
+        -------
+        Array or None
+            One number for each velocity (order 1: for each entry), relative to the size of the equation's terms on its
+            island, shape (dim / order,). None: an explicit method solves no equations.
+        """
+        return None
 
     def start(self, system: System) -> Memory:
         """Memory before the first step, and for islands that were set anew (after a collision, at birth)."""

@@ -65,8 +65,8 @@ class FunctionSystem:
             raise InvalidInput(f"function must return an array of shape ({self.dim},), not {slope.shape}")
         return slope
 
-    def jacobian(self, t: Clock, y: Array) -> Any:
-        """d(dy/dt)/dy, a scipy.sparse CSR array of shape (dim, dim)."""
+    def jacobian(self, t: Clock, y: Array, share: Array | None = None) -> Any:
+        """d(dy/dt)/dy, a scipy.sparse CSR array of shape (dim, dim), always as a whole."""
         from scipy import sparse
 
         return sparse.csr_array(self._differences(t, y) if self._jacobian is None else self._jacobian(t, y))

@@ -29,8 +29,9 @@ VECTORS = [f"{m}{i}" for m in "ab" for i in range(BLOCK)]
 class LinearSolver(Protocol):
     """Solves matrix delta = load."""
 
-    def __call__(self, matrix: Any, load: Array, inertia: Array, islands: Islands) -> tuple[Array, int]:
-        """delta, shape (m,), and the number of iterations that it took, counted for each island.
+    def __call__(self, matrix: Any, load: Array, inertia: Array, islands: Islands) -> tuple[Array, int, Mask]:
+        """delta, shape (m,), the number of iterations that it took, counted for each island, and on which islands no
+        direction was met in which the matrix curves downwards.
 
         Parameters
         ----------
@@ -43,8 +44,9 @@ class LinearSolver(Protocol):
 
 def solve(
     linear: LinearSolver, blocks: tuple[Any, Any], gamma: Array, load: Array, free: Mask, system: System
-) -> tuple[Array, int]:
-    """delta of all unknowns, shape (m,), and the number of iterations of the linear solver; 0 where the load is 0.
+) -> tuple[Array, int, Mask]:
+    """delta of all unknowns, shape (m,), 0 where the load is 0; the number of iterations of the linear solver; and
+    on which islands it saw a matrix that is positive definite, as far as it looked.
 
     Parameters
     ----------
@@ -58,7 +60,7 @@ def solve(
     alone = np.bincount(islands, minlength=n) == BLOCK
     busy = np.zeros(n, np.bool_)
     busy[islands[load != 0.0]] = True
-    delta, count = np.zeros_like(load), 0
+    delta, count, definite = np.zeros_like(load), 0, np.ones(n, np.bool_)
     if (busy & alone).any():
         rows = rows_of(busy & alone, islands)
         delta[rows] = _alone(blocks, gamma[rows[:, 0]], load[rows], rows)
@@ -66,8 +68,9 @@ def solve(
     if len(rest):
         inertia = np.where(free, system.inertia if system.order == 2 else 1.0, 0.0)[rest]
         matrix = _matrix(blocks, gamma, free)[rest][:, rest]
-        delta[rest], count = linear(matrix, load[rest], inertia, islands[rest])
-    return np.where(free, delta, 0.0), count
+        delta[rest], count, seen = linear(matrix, load[rest], inertia, islands[rest])
+        definite[: len(seen)] = seen
+    return np.where(free, delta, 0.0), count, definite
 
 
 def rows_of(mask: Mask, islands: Islands) -> NDArray[np.intp]:
@@ -144,14 +147,15 @@ def _matrix(blocks: tuple[Any, Any], gamma: Array, free: Mask) -> Any:
     return sparse.csr_array(matrix)
 
 
-def direct(matrix: Any, load: Array, inertia: Array, islands: Islands) -> tuple[Array, int]:
+def direct(matrix: Any, load: Array, inertia: Array, islands: Islands) -> tuple[Array, int, Mask]:
     """By LU factors, dense for small systems and sparse for large ones."""
     from scipy.sparse.linalg import splu
 
+    definite = np.ones(number_of(islands), np.bool_)
     try:
         if len(load) <= SMALL:
-            return np.linalg.solve(matrix.toarray(), load), 0
-        return splu(matrix.tocsc()).solve(load), 0
+            return np.linalg.solve(matrix.toarray(), load), 0, definite
+        return splu(matrix.tocsc()).solve(load), 0, definite
     except (np.linalg.LinAlgError, RuntimeError):
         raise singular() from None
 
@@ -167,8 +171,8 @@ class ConjugateGradients:
 
     Each island has step lengths and an end of its own, so that islands do not influence each other. Only movable
     entries take part. What is not symmetric, some damping, is left to Newton's method to correct. Compressed springs
-    make the matrix indefinite; the iteration goes on through directions that curve downwards, because the steps of
-    Newton's method that stop there do not converge for stiff chains.
+    make the matrix indefinite; the iteration ends where it meets a direction that curves downwards, and goes along
+    the first one if that is it.
 
     Parameters
     ----------
@@ -176,7 +180,8 @@ class ConjugateGradients:
 
     Notes
     -----
-    Hestenes and Stiefel, J. Res. NBS 49 (1952), 409; Baraff and Witkin, SIGGRAPH 1998, sec. 5.2.
+    Hestenes and Stiefel, J. Res. NBS 49 (1952), 409; Baraff and Witkin, SIGGRAPH 1998, sec. 5.2; Steihaug, SIAM J.
+    Numer. Anal. 20 (1983), 626.
     """
 
     restarts: ClassVar[int] = 4  # passes allowed for each unknown of an island
@@ -185,7 +190,7 @@ class ConjugateGradients:
     def __init__(self, tolerance: float) -> None:
         self.tolerance = tolerance
 
-    def __call__(self, matrix: Any, load: Array, inertia: Array, islands: Islands) -> tuple[Array, int]:
+    def __call__(self, matrix: Any, load: Array, inertia: Array, islands: Islands) -> tuple[Array, int, Mask]:
         """delta of the symmetric part."""
         from scipy import sparse
 
@@ -197,11 +202,15 @@ class ConjugateGradients:
         x, r = np.zeros_like(load), inertia * load
         z = precondition @ r
         p, rho = z, total(r * z, islands, n)
-        goal, count = self.tolerance**2 * rho, 0
-        for _ in range(min(self.restarts * int(np.bincount(islands).max()), self.most)):
+        goal, count, definite = self.tolerance**2 * rho, 0, np.ones(n, np.bool_)
+        for k in range(min(self.restarts * int(np.bincount(islands).max()), self.most)):
             q = symmetric @ p
             curvature = total(p * q, islands, n)
-            going = (rho > goal) & (curvature != 0.0)
+            down = (rho > goal) & ~(curvature > 0.0)
+            definite &= ~down
+            if k == 0:
+                x = x + np.where(down[islands], p, 0.0)
+            going = (rho > goal) & ~down
             if not going.any():
                 break
             count += int(going.sum())
@@ -211,7 +220,7 @@ class ConjugateGradients:
             fresh = np.where(going, total(r * z, islands, n), rho)
             p = z + np.divide(fresh, rho, out=np.zeros(n), where=going)[islands] * p
             rho = np.where(going, fresh, 0.0)
-        return x, count
+        return x, count, definite
 
 
 def _preconditioner(matrix: Any, free: Mask) -> Any:

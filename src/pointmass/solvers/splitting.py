@@ -46,6 +46,7 @@ class Splitting(Solver):
     """
 
     substeps: ClassVar[tuple[Substep, ...]]
+    moves_masses: ClassVar[bool] = True
     passes: int = 1
     _times: ClassVar[tuple[tuple[float, float], ...]]
 

@@ -9,7 +9,7 @@ import numpy as np
 from pointmass.errors import InvalidInput, whole_number
 from pointmass.solvers.base import Array, Clock, Memory, Solver, Step, System
 from pointmass.solvers.dense import straight
-from pointmass.solvers.islands import moved
+from pointmass.solvers.islands import largest, moved, number_of
 
 
 @final
@@ -38,6 +38,7 @@ class XPBD(Solver):
     evaluations: ClassVar[int] = 1
     implicit: ClassVar[bool] = True
     relaxes: ClassVar[bool] = True
+    moves_masses: ClassVar[bool] = True
 
     def __init__(self, iterations: int = 1) -> None:
         self.iterations = whole_number("iterations", iterations, at_least=1)
@@ -58,3 +59,14 @@ class XPBD(Solver):
         v1 = v1 + (rise - free) / np.where(hx == 0.0, 1.0, hx)
         y1 = moved(h, y, np.concatenate([x + rise, v1]))
         return Step(t, h, y, y1, straight(h, y, y1, True), memory)
+
+    def residual(self, system: System, t: Clock, y: Array, h: Clock, memory: Memory, y1: Array) -> Array:
+        """v1 - v - h a, with the a of the elastic elements at the end of the step and of all else at its start."""
+        n = len(y) // 2
+        elastic = system.deriv_eval(t + h, y1) - system.external(t + h, y1)
+        change, islands = y1[n:] - y[n:], system.islands[n:]
+        count = number_of(islands)
+        size = largest(y[n:], islands, count) + largest(change, islands, count)
+        gap = change - np.broadcast_to(h, y.shape)[n:] * (system.external(t, y) + elastic)[n:]
+        result: Array = gap / np.where(size > 0.0, size, 1.0)[islands]
+        return result

@@ -14,7 +14,7 @@ import numpy as np
 
 from pointmass.tracing.elementary import EXPANSIONS
 from pointmass.tracing.functions import NUMPY
-from pointmass.tracing.program import Program, Symbol, operands
+from pointmass.tracing.program import Function, Node, Primitive, Program, Symbol, operands
 
 INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "and": "&", "or": "|"}
 FLOATS = (np.dtype(np.float64), np.dtype(np.float32))
@@ -58,7 +58,13 @@ def result_node(program: Program, value: Any) -> int:
 
 def source(program: Program, arguments: Sequence[str], name: str) -> str:
     """The program as the text of a Python function of whole columns."""
-    program = expanded(program)
+    return _printed(expanded(program), arguments, name)
+
+
+def _printed(program: Program, arguments: Sequence[str], name: str) -> str:
+    """The same of a program without elementary functions."""
+    calls = {nodes[0]: (k, nodes) for k, nodes in enumerate(_calls(program))}
+    later = {i for _, nodes in calls.values() for i in nodes[1:]}
 
     def text(i: int) -> str:
         op, *rest = program.nodes[i]
@@ -70,17 +76,20 @@ def source(program: Program, arguments: Sequence[str], name: str) -> str:
     for i in program.live():
         op, *_ = node = program.nodes[i]
         parts = [text(o) for o in operands(node)]
-        if op in ("const", "arg"):
+        if op in ("const", "arg") or i in later:
             continue
+        left = f"r{i}"
         if op == "call":
-            right = f"calls[{_calls(program).index(node[1])}].columns({', '.join(parts)})"
+            k, nodes = calls[i]
+            left = ", ".join(f"r{other}" for other in nodes)
+            right = f"calls[{k}]({', '.join(parts)})"
         elif op == "neg":
             right = f"-{parts[0]}"
         elif op in INFIX:
             right = f"{parts[0]} {INFIX[op]} {parts[1]}"
         else:
             right = f"{op}_({', '.join(parts)})"
-        lines.append(f"    r{i} = {right}")
+        lines.append(f"    {left} = {right}")
     outputs = ", ".join(text(o) for o in program.outputs)
     return "\n".join([f"def {name}({', '.join(arguments)}):", *lines, f"    return ({outputs},)", ""])
 
@@ -90,14 +99,16 @@ def columns(program: Program, arguments: Sequence[str], name: str = "law") -> Ca
 
     It computes in float32 where an argument is float32, else in float64, from the first operation to the last.
     """
-    text = source(program, arguments, name)
+    program = expanded(program)
+    text = _printed(program, arguments, name)
     file = f"<pointmass law {name} {sha256(text.encode()).hexdigest()[:12]}>"
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # tracebacks show the line
     code = compile(text, file, "exec")
+    calls = [_function([program.nodes[i][1] for i in nodes]) for nodes in _calls(program)]
     scopes: dict[np.dtype[Any], dict[str, Any]] = {}
     for dtype in FLOATS:
         scopes[dtype] = {f"{op}_": function for op, function in NUMPY.items()}
-        scopes[dtype] |= {"calls": _calls(expanded(program)), "inf": np.inf, "nan": np.nan, "where_": _where(dtype)}
+        scopes[dtype] |= {"calls": calls, "inf": np.inf, "nan": np.nan, "where_": _where(dtype)}
         exec(code, scopes[dtype])
 
     def run(*values: Any) -> tuple[Any, ...]:
@@ -123,8 +134,24 @@ def _where(dtype: np.dtype[Any]) -> Callable[[Any, Any, Any], Any]:
     return lambda c, a, b: np.where(c, np.asarray(a, dtype), np.asarray(b, dtype))[()]
 
 
-def _calls(program: Program) -> list[Any]:
-    return list(dict.fromkeys(program.nodes[i][1] for i in program.live() if program.nodes[i][0] == "call"))
+def _calls(program: Program) -> list[list[int]]:
+    """Nodes that one call computes: functions of a family with the same operands, and each other primitive alone."""
+    found: dict[Node, list[int]] = {}
+    for i in program.live():
+        op, *rest = program.nodes[i]
+        if op == "call":
+            primitive, *places = rest
+            kind = primitive.family if isinstance(primitive, Function) else primitive
+            found.setdefault((kind, *places), []).append(i)
+    return list(found.values())
+
+
+def _function(primitives: Sequence[Primitive]) -> Callable[..., Any]:
+    """What computes those of one call: one column, or one for each where there are several."""
+    first, *others = primitives
+    if others and isinstance(first, Function):
+        return first.together(tuple(primitives)).columns
+    return first.columns
 
 
 def _literal(value: float) -> str:

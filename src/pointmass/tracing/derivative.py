@@ -1,4 +1,9 @@
-"""Exact derivatives of a program, by forward differentiation: one table, one rule per operation."""
+"""Exact derivatives of a program, by one table with a rule for each operation.
+
+A rule gives the derivative of a result from those of its operands. Forward differentiation goes through the program
+once for each input, and is for Jacobians; backward differentiation once for each output, and is for gradients: a rule
+is linear in the derivatives, so that it also says what each operand alone contributes.
+"""
 
 from __future__ import annotations
 
@@ -63,9 +68,30 @@ def gradient(value: Any, vector: Sequence[Symbol]) -> tuple[Any, Any, Any]:
     """Exact gradient of a traced number with respect to a vector argument of the law."""
     if not isinstance(value, Symbol):
         return 0.0, 0.0, 0.0
-    program = value.program
-    slopes = (differentiate(program, [value.node], program.nodes[c.node][1])[0] for c in vector)
-    return tuple(Symbol(program, s) for s in slopes)  # type: ignore[return-value]
+    program, inputs = value.program, {c.node for c in vector}
+    inner = set(inputs)  # nodes that depend on the inputs
+    for i in range(value.node + 1):
+        if program.nodes[i][0] not in FLAT and not inner.isdisjoint(operands(program.nodes[i])):
+            inner.add(i)
+    slopes: dict[int, Any] = {value.node: 1.0}  # of the value, with respect to nodes
+    for i in sorted(inner - inputs, reverse=True):
+        if i in slopes:
+            for o in sorted(inner.intersection(operands(program.nodes[i]))):
+                slopes[o] = slopes.get(o, 0.0) + _contribution(program, i, o, slopes[i])
+    return tuple(slopes.get(c.node, 0.0) for c in vector)
+
+
+def _contribution(program: Program, i: int, operand: int, slope: Any) -> Any:
+    """What node i passes on to one of its operands of the derivative with respect to itself."""
+    op, *_ = node = program.nodes[i]
+    values = [Symbol(program, o) for o in operands(node)]
+    if op == "call":
+        parts = [k for k, o in enumerate(operands(node)) if o == operand]
+        derivatives = (Symbol(program, program.call(node[1].derivative(k), *operands(node))) for k in parts)
+        return sum((d * slope for d in derivatives), start=0.0)
+    if op == "mul" and values[0].node == values[1].node:
+        return (slope + slope) * values[0]
+    return RULES[op](Symbol(program, i), *values, *(slope if v.node == operand else 0.0 for v in values))
 
 
 def _node_derivative(program: Program, i: int, name: str, known: dict[int, int], zero: int) -> int:

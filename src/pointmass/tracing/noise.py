@@ -18,7 +18,7 @@ from numpy.polynomial import Polynomial
 from pointmass.errors import number, whole_number
 from pointmass.tracing.elementary import polynomial
 from pointmass.tracing.functions import Number, floor, where
-from pointmass.tracing.program import Primitive, Program, Symbol
+from pointmass.tracing.program import Function, Primitive, Program, Symbol
 from pointmass.tracing.trace import Traced, trace
 
 PERIOD = 2.0**24  # cells after which the lattice repeats: float32 knows no whole numbers beyond
@@ -89,25 +89,6 @@ def _call(primitive: Primitive, arguments: Sequence[Number]) -> Number:
             nodes = [argument.lift(a) for a in arguments]
             return Symbol(argument.program, argument.program.call(primitive, *nodes))
     return primitive.columns(*arguments)
-
-
-class Function(Primitive):
-    """An operation with a program of its own, which kernels call as a function.
-
-    Several of a family that have the same arguments are computed together.
-    """
-
-    @property
-    def family(self) -> Hashable:
-        """What those have in common that may be computed together."""
-        raise NotImplementedError
-
-    def together(self, members: tuple[Any, ...]) -> Traced:
-        """The program of several members of the family, with an output for each."""
-        raise NotImplementedError
-
-    def columns(self, *arguments: Any) -> Any:
-        return self.together((self,)).columns(*arguments)[0]
 
 
 class Noise(Function):

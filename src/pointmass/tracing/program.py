@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pointmass.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from pointmass.tracing.trace import Traced
 
 Node = tuple[Any, ...]  # ("const", value), ("arg", name), ("call", primitive, *nodes) or (operation, *nodes)
 
@@ -108,6 +111,11 @@ class Program:
                 used.add(node)
                 stack.extend(operands(self.nodes[node]))
         return sorted(used)
+
+    @property
+    def text(self) -> tuple[Any, ...]:
+        """What it computes, to be compared: derivatives that were asked for have added nodes that it does not use."""
+        return tuple((i, self.nodes[i]) for i in self.live()), tuple(self.outputs)
 
     def arguments(self) -> set[str]:
         """Names of the inputs that the outputs depend on."""
@@ -237,6 +245,25 @@ class Primitive:
     def inlined(self, *arguments: Symbol) -> Any:
         """The value as operations on symbols, for a place that calls no functions; None where it has none."""
         return None
+
+
+class Function(Primitive):
+    """An operation with a program of its own, which kernels call as a function.
+
+    Several of a family that have the same arguments are computed together.
+    """
+
+    @property
+    def family(self) -> Hashable:
+        """What those have in common that may be computed together."""
+        raise NotImplementedError
+
+    def together(self, members: tuple[Any, ...]) -> Traced:
+        """The program of several members of the family, with an output for each."""
+        raise NotImplementedError
+
+    def columns(self, *arguments: Any) -> Any:
+        return self.together((self,)).columns(*arguments)[0]
 
 
 class Symbol:
