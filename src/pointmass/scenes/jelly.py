@@ -12,7 +12,7 @@ import numpy as np
 from pointmass.bodies import Body, jelly
 from pointmass.collisions import Plane
 from pointmass.errors import InvalidInput
-from pointmass.forces import Gravity
+from pointmass.forces import Bulk, Gravity
 from pointmass.frame import Camera, Frame
 from pointmass.look import Look
 from pointmass.scene import Scene
@@ -23,6 +23,7 @@ COLORS = (("#e0315c", "#c41f4a"), ("#f29a1f", "#dd8410"), ("#5db431", "#4a9c22")
           ("#a25bc9", "#8d48b4"))  # fmt: skip
 
 BORNE = 0.5  # pressure of its weight that a jelly bears, relative to its stiffness
+CROWDED = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,8 +32,8 @@ class JellyScene(ShippedScene):
 
     A jelly bears its weight as long as density gravity size, the pressure under it, is at most half of its stiffness; a
     softer one would lie flat. So size, density and gravity end, and stiffness begins, where this holds with the others
-    at their defaults. Poisson's ratio begins at 0.3, as the springs alone, which have 1/4, hold no volume: once they
-    are crushed they stay so.
+    at their defaults; height ends where a fall begins to crush the corner that they land on to nothing. Poisson's ratio
+    begins at 0.3, as the springs alone, which have 1/4, hold no volume: once they are crushed they stay so.
 
     Raises
     ------
@@ -56,7 +57,7 @@ class JellyScene(ShippedScene):
     poisson: float = knob(0.35, "Poisson's ratio: how it bulges when squeezed", low=0.3, high=0.49)
     viscosity: float = knob(150.0, "stress for each unit of strain in a second", unit="Pa s", low=0, high=1000)
     density: float = knob(1000.0, "of jelly", unit="kg/m^3", low=100, high=2500)
-    height: float = knob(0.25, "of the lowest corner at the start", unit="m", low=0, high=10)
+    height: float = knob(0.25, "of the lowest corner at the start", unit="m", low=0, high=2)
     tilt: float = knob(30.0, "how far each is turned", unit="degrees", low=-180, high=180)
     friction: float = knob(0.6, "of the floor", low=0, high=10)
     gravity: float = knob(9.81, "gravity, downwards", unit="m/s^2", low=0, high=25)
@@ -88,6 +89,12 @@ class JellyScene(ShippedScene):
             made.append(jelly(counts, sides, center=(x, self.height - lowest, 0.0), **options))
         return made
 
+    def _squeezed(self, fallen: float, k: int) -> float:
+        """Part of its volume that each tetrahedron of jelly `k` keeps in a fall of so much energy [J/m^3]."""
+        mu = self.stiffness * self.contrast**k / (2 * (1 + self.poisson))
+        held = 8 * CROWDED * fallen / (mu * (4 * self.poisson - 1) / (1 - 2 * self.poisson)) + 2  # J^2 + 1/J^2
+        return math.sqrt(2 / (held + math.sqrt(held * held - 4)))
+
     def build(self) -> Scene:
         """The jellies above a floor."""
         bodies = self.bodies()
@@ -95,9 +102,10 @@ class JellyScene(ShippedScene):
         solver = SymplecticEuler()
         # The energy of the fall squashes jellies: they spread, and volumes with wide faces are stiffer and more damped,
         # by some 4.4 strain with a Poisson's ratio of 0.49. `substeps` has room for 2.7.
-        fallen = self.density * self.gravity * (self.height + self.size) / self.stiffness
-        room = max(1.0, math.sqrt(2.7 * fallen))
-        count = math.ceil(room * max(substeps(solver, *stiffest(body)) for body in bodies))
+        fallen = self.density * self.gravity * (self.height + self.size)
+        room = max(1.0, math.sqrt(2.7 * fallen / self.stiffness))
+        steps = [substeps(solver, *stiffest(body, self._squeezed(fallen, k))) for k, body in enumerate(bodies)]
+        count = math.ceil(room * max(steps))
         width = 2.0 * self.size * self.jellies
         looks = {
             name: Look(color=color, pattern="checker", pattern_color=other, pattern_count=4)
@@ -120,7 +128,8 @@ class JellyScene(ShippedScene):
         )
 
     def check(self, frames: Sequence[Frame]) -> None:
-        """Nobody is in the floor, no energy comes from nowhere, and no jelly has lost its volume or is torn apart."""
+        """Nobody is in the floor, no energy comes from nowhere, no tetrahedron was ever flat or inside out, and no
+        jelly has lost its volume or is torn apart."""
         last = frames[-1]
         lowest = min(float(f.positions[:, 1].min()) for f in frames)
         expect(lowest >= -1e-6, f"a jelly sank {-lowest:.2g} m into the floor")
@@ -130,8 +139,12 @@ class JellyScene(ShippedScene):
         expect(lost >= -allowed, f"the jellies gained {-lost:.2g} J")
         first = 0
         for k, body in enumerate(self.bodies()):
-            x = last.positions[first : first + len(body.particles)]
-            first += len(x)
+            mine = slice(first, first + len(body.particles))
+            first, x = mine.stop, last.positions[mine]
+            bulk = next(force for force in body.forces if isinstance(force, Bulk))
+            rest = bulk.rests(body.particles, 0.0)
+            part, frame = min((float((bulk.at(f.positions[mine][bulk.ids]) / rest).min()), f.number) for f in frames)
+            expect(part > 0, f"a tetrahedron of jelly {k + 1} has {100 * part:.0f}% of its volume in frame {frame}")
             a, b, c = np.moveaxis(x[body.triangles], 1, 0)
             part = float((a * np.cross(b, c)).sum() / 6) / self.size**3
             expect(0.5 < part < 1.5, f"jelly {k + 1} has {100 * part:.0f}% of its volume")
