@@ -167,7 +167,7 @@ EXAMPLES: dict[str, list[Example]] = {
             naive.bulk_energy,
             elements=FOURS,
         )
-        for rest in (0.1, 10.0)  # some inside out, some squeezed more than is looked up here
+        for rest in (0.1, 10.0)  # either side of a fifth of it
     ],
     "attractor": [
         Example(

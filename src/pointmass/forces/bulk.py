@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from numpy.typing import ArrayLike
 
 from pointmass.forces.volumes import Volumes
-from pointmass.laws.elements import ConstraintForce
 from pointmass.laws.parameter import Parameter, Scalar
 from pointmass.tracing import functions as fn
 
@@ -43,12 +43,8 @@ class Bulk(Volumes):
     def __init__(
         self, tetrahedra: ArrayLike, k_s: Scalar = 1.0, k_d: Scalar = 0.0, rest: Scalar = 1.0, *, enabled: bool = True
     ) -> None:
-        parameters = [
-            Parameter("k_s", k_s, unit="N/m^5", at_least=0),
-            Parameter("k_d", k_d, unit="N s/m^5", at_least=0),
-            Parameter("rest", rest, unit="m^3", above=0),
-        ]
-        ConstraintForce.__init__(self, tetrahedra, parameters, enabled)
+        super().__init__(tetrahedra, k_s, k_d, rest, enabled=enabled)
+        self.parameters["rest"] = Parameter("rest", rest, unit="m^3", above=0)
 
     @staticmethod
     def excess(c: Any, rest: Any) -> Any:
@@ -69,6 +65,12 @@ class Bulk(Volumes):
 def steepness(j: float) -> float:
     """Stiffness of a tetrahedron that has a part `j` of its volume, relative to k_s."""
     return 0.25 * (1.0 + 3.0 * max(j, FLAT) ** -4)
+
+
+def squeezed(energy: float) -> float:
+    """Part of its volume to which an energy of so many k_s rest^2 brings a tetrahedron, while that is above `FLAT`."""
+    both = 8.0 * energy + 2.0  # J^2 + 1/J^2
+    return math.sqrt(2.0 / (both + math.sqrt(both * both - 4.0)))
 
 
 def _rise(j: Any) -> Any:

@@ -342,7 +342,7 @@ class ConstraintForce(ElementForce):
         def parts(*arguments: Any) -> Any:
             x, k_s, k_d, rest = self._parts(arguments, 1)
             c = self.constraint(*x)
-            excess, steep = self._tension(c, rest)
+            excess, steep = self._excess(c, rest)
             return [excess / steep, k_s * steep, k_d, *(gradient(c, node) for node in x)]
 
         return trace(parts, kept, 3 + 3 * self.nodes, f"{self.name} constraint")
@@ -391,7 +391,7 @@ class ConstraintForce(ElementForce):
         state, (t, k_s, k_d, rest, *own) = arguments[: each * self.nodes], arguments[each * self.nodes :]
         return state, k_s, k_d, self.resting(t, rest, *own)
 
-    def _tension(self, c: Any, rest: Any) -> tuple[Any, Any]:
+    def _excess(self, c: Any, rest: Any) -> tuple[Any, Any]:
         """`excess` and its slope, of a traced C."""
         excess = self.excess(c, rest)
         (steep,) = gradient(excess, (c,))
@@ -406,7 +406,7 @@ class ConstraintForce(ElementForce):
         rate: Any = 0.0
         for slope, velocity in zip(slopes, v, strict=True):
             rate = rate + fn.dot(slope, velocity)
-        excess, steep = self._tension(c, rest)
+        excess, steep = self._excess(c, rest)
         return slopes, rate, k_s * excess + k_d * rate, k_s * steep
 
 

@@ -127,7 +127,7 @@ def substeps(solver: Solver, stiffness: float, damping: float) -> int:
     return math.ceil(1 / 60 / (0.8 * largest_safe_step(solver, parts * stiffness, parts * damping)))
 
 
-def stiffest(body: Body, squeezed: float = 1.0) -> tuple[float, float]:
+def stiffest(body: Body, part: float = 1.0) -> tuple[float, float]:
     """Bounds of the stiffness and the damping of the springs and volumes of a body [1/s^2, 1/s], for `substeps`.
 
     An element with k nodes adds at most k k_s |dC/dx|^2 |x|^2 of each of them to x K x: for a spring 2 k_s |x|^2 of
@@ -136,7 +136,7 @@ def stiffest(body: Body, squeezed: float = 1.0) -> tuple[float, float]:
 
     Parameters
     ----------
-    squeezed : part of its volume that each tetrahedron of a solid (`Bulk`) keeps at least.
+    part : of its volume to which each tetrahedron of a solid (`Bulk`) is squeezed.
     """
     p = body.particles
     total = np.zeros((2, len(p)))
@@ -148,7 +148,7 @@ def stiffest(body: Body, squeezed: float = 1.0) -> tuple[float, float]:
             for k, name in enumerate(("k_s", "k_d")):
                 value = force.nodes * np.broadcast_to(settings[name][0], len(rows))[:, None] * slope
                 if name == "k_s" and isinstance(force, Bulk):
-                    value = steepness(squeezed) * value
+                    value = steepness(part) * value
                 total[k] += np.bincount(rows.ravel(), value.ravel(), len(p))
     stiffness, damping = (total / p.m).max(axis=1)
     return float(stiffness), float(damping)
