@@ -4,8 +4,6 @@ They beat their tails without a brain, so that peers can do the same. The scene 
 timed alone.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import partial
@@ -21,10 +19,11 @@ if TYPE_CHECKING:
     import pointmass as pm
 
 TITLE = "Fish"
-SCHOOL = "A school with brains"
+SCHOOL = "A school with brains, six frames and a look"
 LENGTH = 0.3  # [m]
 SUBSTEPS = 16
 DT = 1 / 60 / SUBSTEPS
+LOOK = 6 * SUBSTEPS  # steps from one look of the brains to the next
 TOLERANCE = 1e-3  # of a fish
 JUDGED = 4  # fish that the judge looks at
 BEAT, FREQUENCY = 0.2, 2.0  # of the tail [1, 1/s]
@@ -52,9 +51,9 @@ def races(quick: bool) -> list[Race]:
             partial(int, n),
             [Brains],
             judge_school,
-            work=float(SUBSTEPS * n),
+            work=float(LOOK * n),
             particles=23 * n,
-            traffic=23 * 48 / SUBSTEPS,
+            traffic=23 * 48 / LOOK,
         )
         for n in ((20,) if quick else (1000, 10_000))
     ]
@@ -90,7 +89,7 @@ class Shoal:
     upright: float
 
 
-def bodies(count: int) -> pm.Body:
+def bodies(count: int) -> "pm.Body":
     """The fish of pointmass, which beat their tails."""
     import pointmass as pm
     from pointmass.controllers.swimmers import LAG, SEGMENTS, SIDES, SWIMS
@@ -157,11 +156,11 @@ def judge_school(count: int, scheme: str) -> Judge:
     sim = school(count, "float64").simulation()
     whole = sim.system
     alone = pm.Simulation(whole, sim.solver, sim.dt, controllers=sim.controllers, seed=sim.seed, compiled=False)
-    alone.step(SUBSTEPS)
+    alone.step(LOOK)
     return against(whole.particles.x, 0.2, TOLERANCE)
 
 
-def school(count: int, dtype: str = "float32") -> pm.Scene:
+def school(count: int, dtype: str = "float32") -> "pm.Scene":
     """The shipped scene."""
     import pointmass as pm
 
@@ -174,7 +173,7 @@ class Brains(Ours):
     """The scene as `pointmass run school` makes it, in float32."""
 
     def __init__(self, count: int) -> None:
-        self.sim, self.steps = school(count).simulation(), SUBSTEPS
+        self.sim, self.steps = school(count).simulation(), LOOK
 
 
 class Pointmass(Ours):
