@@ -393,6 +393,21 @@ def volume_energy(x, k_s, k_d, rest):
     return 0.5 * k_s * (tetrahedron(x) / 6 - rest) ** 2
 
 
+def bulk(x, v, k_s, k_d, rest):
+    """A spring on the volume with the slope of `bulk_energy` for its tension."""
+    j = tetrahedron(x) / 6 / rest
+    tension = rest * ((j - j**-3) / 4 if j >= 0.2 else -31.2 + 469 * (j - 0.2))
+    return volume(x, v, k_s, k_d, tetrahedron(x) / 6 - tension)
+
+
+def bulk_energy(x, k_s, k_d, rest):
+    """k_s rest^2 (J - 1/J)^2 / 8, and Taylor's series of that around a fifth, to the second order, below it."""
+    j = tetrahedron(x) / 6 / rest
+    if j >= 0.2:
+        return k_s * rest**2 * (j - 1 / j) ** 2 / 8
+    return k_s * rest**2 * (2.88 - 31.2 * (j - 0.2) + 234.5 * (j - 0.2) ** 2)
+
+
 # ------------------------------------------------------------------------------------------------ pairs
 
 

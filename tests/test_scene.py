@@ -43,6 +43,7 @@ NEEDED: dict[str, dict[str, Any]] = {
     "angles": {"joints": [[0, 1, 2]]},
     "hinges": {"hinges": [[0, 1, 2, 3]]},
     "volumes": {"tetrahedra": [[0, 1, 2, 3]]},
+    "bulk": {"tetrahedra": [[0, 1, 2, 3]]},
     "plate_wind": {"triangles": [[0, 1, 2]]},
     "water": {"triangles": [[0, 1, 2]]},
     "fins": {"sections": [[0, 1, 2, 3]]},

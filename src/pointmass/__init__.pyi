@@ -184,6 +184,9 @@ from .forces import (
     Avoid as Avoid,
 )
 from .forces import (
+    Bulk as Bulk,
+)
+from .forces import (
     Buoyancy as Buoyancy,
 )
 from .forces import (

@@ -101,6 +101,25 @@ def test_the_inside_of_a_surface_is_checked_and_kept() -> None:
     assert p.surfaces["skin"].inside.tolist() == []
 
 
+def test_its_tetrahedra_fill_it_and_wind_to_the_right() -> None:
+    body = pm.jelly((3, 4, 4), CELL * (2, 3, 3), tilt=25.0)
+    volumes = body.forces[-1].values(body.particles, body.particles.x)
+    assert volumes.min() > 0
+    assert volumes.sum() == pytest.approx(18 * np.prod(CELL), rel=1e-12)
+
+
+@pytest.mark.parametrize("solver", [pm.SymplecticEuler(), pm.ImplicitEuler(tolerance=1e-3)], ids=lambda s: s.name)
+def test_dropped_hard_it_does_not_turn_inside_out(solver: pm.Solver) -> None:
+    """On a corner, at 4 m/s: springs on volumes would leave one flat."""
+    body = pm.jelly((3, 3, 3), (0.2, 0.2, 0.2), tilt=30.0, velocity=(0, -4, 0), stiffness=2e4, viscosity=50.0)
+    p, bulk = body.particles, body.forces[-1]
+    p.x[:, 1] -= p.x[:, 1].min()
+    system = pm.ParticleSystem(p, [pm.Gravity(), *body.forces], colliders=[pm.Plane(restitution=0.0, friction=0.5)])
+    sim = pm.Simulation(system, solver, 1 / 60 if solver.implicit else 1 / 1200, compiled=False)
+    rest = bulk.rests(p, 0.0)
+    assert min((bulk.values(p, p.x) / rest).min() for _ in sim.frames(20, 60.0)) > 0.15
+
+
 def sag(counts: tuple[int, int, int], size: tuple[float, float, float], poisson: float) -> float:
     """How far the bottom of a block hangs below where it was, under its weight [m]; it is held at the top."""
     body = pm.jelly(counts, size, stiffness=3e4, poisson=poisson, viscosity=3000.0, pinned="top")

@@ -159,6 +159,16 @@ EXAMPLES: dict[str, list[Example]] = {
             elements=FOURS,
         )
     ],
+    "bulk": [
+        Example(
+            {"tetrahedra": FOURS, "k_s": [2.0, 3.0], "k_d": 0.5, "rest": f"{rest} + 0.3*t"},
+            lambda e, rest=rest: {"k_s": (2.0, 3.0)[e], "k_d": 0.5, "rest": rest + 0.3 * TIME},
+            naive.bulk,
+            naive.bulk_energy,
+            elements=FOURS,
+        )
+        for rest in (0.1, 10.0)  # either side of a fifth of it
+    ],
     "attractor": [
         Example(
             {"mu": 2.0, "center": (0.1, 0.2, -0.1)},

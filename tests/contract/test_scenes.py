@@ -50,23 +50,26 @@ def test_scene_passes_its_check_and_repeats_its_bits(name: str, settings: dict[s
     assert bits(again) == bits(first[:10])
 
 
-FEW: dict[str, dict[str, object]] = {  # of scenes with a cloth that are made for implicit steps
+FEW: dict[str, dict[str, object]] = {  # of scenes that implicit steps are made for, or that take them as well
     "cloth": {"particles": 8},
     "flag": {"particles": 8},
     "drape": {"particles": 8},
     "curtain": {"particles": 9, "rings": 3},
     "tear": {"particles": 8},
+    "heap": {"cloths": 2, "particles": 8},
+    "jelly": {"particles": 3, "jellies": 2},
+    "hair": {"strands": 3, "points": 12, "length": 0.2, "children": 0},
 }
-SHEETS = [(n, p) for n in FEW for p in (None, *SCENES[n].presets)]
+SOFT = [(n, p) for n in FEW for p in (None, *SCENES[n].presets)]
 
 
 def in_implicit_steps(scene: Scene) -> Simulation:
-    """The scene, with whatever leads, tears or meets its cloth, in steps of backward Euler of 1/60 s."""
+    """The scene, with whatever leads, tears or meets its bodies, in steps of backward Euler of 1/60 s."""
     return replace(scene, solver=ImplicitEuler(tolerance=1e-3), dt=1 / 60).simulation()
 
 
-@pytest.mark.parametrize(("name", "preset"), SHEETS)
-def test_cloth_takes_implicit_steps_of_a_sixtieth(name: str, preset: str | None) -> None:
+@pytest.mark.parametrize(("name", "preset"), SOFT)
+def test_a_soft_body_takes_implicit_steps_of_a_sixtieth(name: str, preset: str | None) -> None:
     shipped = SCENES[name].with_settings(FEW[name], preset)
     scene = shipped.build()
     simulation = in_implicit_steps(scene)
@@ -76,8 +79,8 @@ def test_cloth_takes_implicit_steps_of_a_sixtieth(name: str, preset: str | None)
 
 @pytest.mark.full
 @pytest.mark.parametrize("small", [True, False], ids=["small", "normal"])
-@pytest.mark.parametrize(("name", "preset"), SHEETS)
-def test_cloth_takes_implicit_steps_of_a_sixtieth_at_full_length(
+@pytest.mark.parametrize(("name", "preset"), SOFT)
+def test_a_soft_body_takes_implicit_steps_of_a_sixtieth_at_full_length(
     name: str, preset: str | None, small: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("POINTMASS_ENGINE", "compiled")

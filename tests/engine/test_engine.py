@@ -78,6 +78,7 @@ LAWS: dict[str, list[Callable[[], pm.Force]]] = {
     "angles": [lambda: pm.Angles([(0, 1, 2), (2, 5, 1)], 2.0, 0.1, rest=0.5)],
     "hinges": [lambda: pm.Hinges([(0, 1, 2, 3), (2, 5, 1, 4)], 2.0, 0.1)],
     "volumes": [lambda: pm.Volumes([(0, 1, 2, 3), (2, 5, 1, 6)], 2.0, 0.1, rest=0.5)],
+    "bulk": [lambda: pm.Bulk([(0, 1, 2, 3), (2, 5, 1, 6)], 2.0, 0.1, rest=0.5)],
     "own": [lambda: own(strength="charge"), lambda: corner(elements=[(0, 1, 2), (5, 6, 7)])],
     "flow": [
         lambda: pm.Flow(("-y", "x + 0.2*sin(t)", "0")),

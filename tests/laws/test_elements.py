@@ -16,6 +16,7 @@ FORCES = {
     "angles": lambda: pm.Angles([(0, 1, 2), (3, 4, 5)], 2.0, 0.1),
     "hinges": lambda: pm.Hinges([(0, 1, 2, 3)], 2.0, 0.1, 0.3),
     "volumes": lambda: pm.Volumes([(0, 1, 2, 3)], 2.0, 0.1, 0.3),
+    "bulk": lambda: pm.Bulk([(0, 1, 2, 3)], 2.0, 0.1, 0.3),
 }
 
 

@@ -6,6 +6,7 @@ from pointmass.errors import unknown
 from pointmass.forces.angles import Angles
 from pointmass.forces.attractor import Attractor
 from pointmass.forces.avoid import Avoid
+from pointmass.forces.bulk import Bulk
 from pointmass.forces.buoyancy import Buoyancy
 from pointmass.forces.cruise import Cruise
 from pointmass.forces.curl_noise import CurlNoise
@@ -57,6 +58,7 @@ FORCES: dict[str, type[Force]] = {
     "angles": Angles,
     "hinges": Hinges,
     "volumes": Volumes,
+    "bulk": Bulk,
     "attractor": Attractor,
     "line_attractor": LineAttractor,
     "ring_attractor": RingAttractor,
@@ -94,6 +96,7 @@ __all__ = [
     "Angles",
     "Attractor",
     "Avoid",
+    "Bulk",
     "Buoyancy",
     "Cruise",
     "CurlNoise",

@@ -262,6 +262,7 @@ class ConstraintForce(ElementForce):
     `f_a = -[k_s (C - rest) + k_d dC/dt] dC/dx_a`, with `dC/dt = sum_a dC/dx_a . v_a` (Witkin, Particle System Dynamics,
     section on energy functions): force, damping, energy and Jacobian follow from C alone. The first parameters are
     named k_s, k_d and rest; without a rest, C at the start is measured. What others there are act through `resting`.
+    A spring that is not linear says so by `excess` and `stored`.
 
     Attributes
     ----------
@@ -292,18 +293,28 @@ class ConstraintForce(ElementForce):
         """C without force at time t, from the parameter `rest` and those after it."""
         return rest
 
+    @staticmethod
+    def excess(c: Any, rest: Any) -> Any:
+        """Tension for each unit of k_s: C - rest, or what else rises with C and is the same to first order."""
+        return c - rest
+
+    @staticmethod
+    def stored(c: Any, rest: Any) -> Any:
+        """Energy for each unit of k_s: the integral of `excess` over C, from rest."""
+        return 0.5 * (c - rest) ** 2
+
     def law(self, *arguments: Any) -> Any:
         """The forces on all nodes."""
         state, k_s, k_d, rest = self._parts(arguments, 2)
-        slopes, _, tension = self._pulled(state, k_s, k_d, rest)
+        slopes, _, tension, _ = self._pulled(state, k_s, k_d, rest)
         return [fn.scale(-tension, slope) for slope in slopes]
 
     def measure(self) -> Callable[..., Any]:
-        """E = k_s (C - rest)^2 / 2."""
+        """E = k_s times what is `stored`: k_s (C - rest)^2 / 2."""
 
         def energy(*arguments: Any) -> Any:
             x, k_s, _, rest = self._parts(arguments, 1)
-            return 0.5 * k_s * (self.constraint(*x) - rest) ** 2
+            return k_s * self.stored(self.constraint(*x), rest)
 
         return energy
 
@@ -312,16 +323,17 @@ class ConstraintForce(ElementForce):
         """df/dx and df/dv; what makes -df/dx indefinite counts `share` times.
 
         With the tension T = k_s (C - rest) + k_d dC/dt, -df_a/dx_b = k_s dC/dx_a dC/dx_b + k_d dC/dx_a d(dC/dt)/dx_b +
-        T d2C/dx_a dx_b. The first term is positive semi-definite, and so is the last where C is convex and T > 0;
-        `share` is on all others. 1 gives the exact Jacobian, and 0 that of Choi and Ko (Stable but Responsive Cloth,
-        SIGGRAPH 2002) for springs, that of Gauss and Newton for angles.
+        T d2C/dx_a dx_b (with another `excess`, k_s times its slope in the first term). That term is positive
+        semi-definite, and so is the last where C is convex and T > 0; `share` is on all others. 1 gives the exact
+        Jacobian, and 0 that of Choi and Ko (Stable but Responsive Cloth, SIGGRAPH 2002) for springs, that of Gauss and
+        Newton for angles.
         """
 
         def slopes(*arguments: Any) -> Any:
             *given, share = arguments
             state, k_s, k_d, rest = self._parts(given, 2)
             x = state[0::2]
-            gradients, rate, tension = self._pulled(state, k_s, k_d, rest)
+            gradients, rate, tension, stiffness = self._pulled(state, k_s, k_d, rest)
             turns = [gradient(rate, node) for node in x]
             bending = tension * (fn.where(tension > 0.0, 1.0, share) if self.convex else share)
             outputs = []
@@ -329,7 +341,7 @@ class ConstraintForce(ElementForce):
                 for node, along, turn in zip(x, gradients, turns, strict=True):
                     curved = gradient(row, node)
                     outputs += [
-                        -(row * (k_s * along[i] + share * k_d * turn[i]) + bending * curved[i]) for i in range(3)
+                        -(row * (stiffness * along[i] + share * k_d * turn[i]) + bending * curved[i]) for i in range(3)
                     ]
                     outputs += [-(row * k_d * along[i]) for i in range(3)]
             return outputs
@@ -339,13 +351,17 @@ class ConstraintForce(ElementForce):
 
     @cached_property
     def traced_constraint(self) -> Traced:
-        """C - rest, k_s, k_d, dC/dx1, ..., dC/dxk as a program."""
+        """C - rest, k_s, k_d, dC/dx1, ..., dC/dxk as a program.
+
+        Where `excess` is another, the first two are those of the spring that has its tension and its stiffness now.
+        """
         kept = {n: k for n, k in self._signature().items() if not n.startswith("v")}
 
         def parts(*arguments: Any) -> Any:
             x, k_s, k_d, rest = self._parts(arguments, 1)
             c = self.constraint(*x)
-            return [c - rest, k_s, k_d, *(gradient(c, node) for node in x)]
+            excess, steep = self._excess(c, rest)
+            return [excess / steep, k_s * steep, k_d, *(gradient(c, node) for node in x)]
 
         return trace(parts, kept, 3 + 3 * self.nodes, f"{self.name} constraint")
 
@@ -393,15 +409,23 @@ class ConstraintForce(ElementForce):
         state, (t, k_s, k_d, rest, *own) = arguments[: each * self.nodes], arguments[each * self.nodes :]
         return state, k_s, k_d, self.resting(t, rest, *own)
 
-    def _pulled(self, state: Sequence[Any], k_s: Any, k_d: Any, rest: Any) -> tuple[list[Any], Any, Any]:
-        """dC/dx of each node, dC/dt, and the tension k_s (C - rest) + k_d dC/dt, of traced places and velocities."""
+    def _excess(self, c: Any, rest: Any) -> tuple[Any, Any]:
+        """`excess` and its slope, of a traced C."""
+        excess = self.excess(c, rest)
+        (steep,) = gradient(excess, (c,))
+        return excess, steep
+
+    def _pulled(self, state: Sequence[Any], k_s: Any, k_d: Any, rest: Any) -> tuple[list[Any], Any, Any, Any]:
+        """Of traced places and velocities: dC/dx of each node, dC/dt, the tension k_s (C - rest) + k_d dC/dt, and its
+        slope k_s."""
         x, v = state[0::2], state[1::2]
         c = self.constraint(*x)
         slopes = [gradient(c, node) for node in x]
         rate: Any = 0.0
         for slope, velocity in zip(slopes, v, strict=True):
             rate = rate + fn.dot(slope, velocity)
-        return slopes, rate, k_s * (c - rest) + k_d * rate
+        excess, steep = self._excess(c, rest)
+        return slopes, rate, k_s * excess + k_d * rate, k_s * steep
 
 
 def spring_force(law: Callable[..., Any]) -> type[ElementForce]:

@@ -12,7 +12,8 @@ import numpy as np
 
 from pointmass.bodies import Body
 from pointmass.errors import InvalidInput, PointmassError, number, unknown
-from pointmass.forces import Springs, Volumes
+from pointmass.forces import Bulk, Springs, Volumes
+from pointmass.forces.bulk import steepness
 from pointmass.frame import Frame
 from pointmass.scene import Scene
 from pointmass.solvers.base import Solver
@@ -126,12 +127,16 @@ def substeps(solver: Solver, stiffness: float, damping: float) -> int:
     return math.ceil(1 / 60 / (0.8 * largest_safe_step(solver, parts * stiffness, parts * damping)))
 
 
-def stiffest(body: Body) -> tuple[float, float]:
+def stiffest(body: Body, part: float = 1.0) -> tuple[float, float]:
     """Bounds of the stiffness and the damping of the springs and volumes of a body [1/s^2, 1/s], for `substeps`.
 
     An element with k nodes adds at most k k_s |dC/dx|^2 |x|^2 of each of them to x K x: for a spring 2 k_s |x|^2 of
     each end, whichever way it points and as long as it is not stretched beyond all measure. So no frequency^2 is above
     the largest sum of that over m at a particle, however a body of springs is folded; volumes are taken as they are.
+
+    Parameters
+    ----------
+    part : of its volume to which each tetrahedron of a solid (`Bulk`) is squeezed.
     """
     p = body.particles
     total = np.zeros((2, len(p)))
@@ -142,6 +147,8 @@ def stiffest(body: Body) -> tuple[float, float]:
             slope = np.ones(rows.shape) if isinstance(force, Springs) else (force.slopes(p.x[rows]) ** 2).sum(axis=2)
             for k, name in enumerate(("k_s", "k_d")):
                 value = force.nodes * np.broadcast_to(settings[name][0], len(rows))[:, None] * slope
+                if name == "k_s" and isinstance(force, Bulk):
+                    value = steepness(part) * value
                 total[k] += np.bincount(rows.ravel(), value.ravel(), len(p))
     stiffness, damping = (total / p.m).max(axis=1)
     return float(stiffness), float(damping)

@@ -12,7 +12,8 @@ import numpy as np
 from pointmass.bodies import Body, jelly
 from pointmass.collisions import Plane
 from pointmass.errors import InvalidInput
-from pointmass.forces import Gravity
+from pointmass.forces import Bulk, Gravity
+from pointmass.forces.bulk import squeezed
 from pointmass.frame import Camera, Frame
 from pointmass.look import Look
 from pointmass.scene import Scene
@@ -31,8 +32,8 @@ class JellyScene(ShippedScene):
 
     A jelly bears its weight as long as density gravity size, the pressure under it, is at most half of its stiffness; a
     softer one would lie flat. So size, density and gravity end, and stiffness begins, where this holds with the others
-    at their defaults. Poisson's ratio begins at 0.3, as the springs alone, which have 1/4, hold no volume: once they
-    are crushed they stay so.
+    at their defaults; height ends where a fall begins to crush the corner that they land on to nothing. Poisson's ratio
+    begins at 0.3, as the springs alone, which have 1/4, hold no volume: once they are crushed they stay so.
 
     Raises
     ------
@@ -56,7 +57,7 @@ class JellyScene(ShippedScene):
     poisson: float = knob(0.35, "Poisson's ratio: how it bulges when squeezed", low=0.3, high=0.49)
     viscosity: float = knob(150.0, "stress for each unit of strain in a second", unit="Pa s", low=0, high=1000)
     density: float = knob(1000.0, "of jelly", unit="kg/m^3", low=100, high=2500)
-    height: float = knob(0.25, "of the lowest corner at the start", unit="m", low=0, high=10)
+    height: float = knob(0.25, "of the lowest corner at the start", unit="m", low=0, high=2)
     tilt: float = knob(30.0, "how far each is turned", unit="degrees", low=-180, high=180)
     friction: float = knob(0.6, "of the floor", low=0, high=10)
     gravity: float = knob(9.81, "gravity, downwards", unit="m/s^2", low=0, high=25)
@@ -94,10 +95,13 @@ class JellyScene(ShippedScene):
         names = [f"jelly {k + 1}" for k in range(self.jellies)]
         solver = SymplecticEuler()
         # The energy of the fall squashes jellies: they spread, and volumes with wide faces are stiffer and more damped,
-        # by some 4.4 strain with a Poisson's ratio of 0.49. `substeps` has room for 2.7.
-        fallen = self.density * self.gravity * (self.height + self.size) / self.stiffness
-        room = max(1.0, math.sqrt(2.7 * fallen))
-        count = math.ceil(room * max(substeps(solver, *stiffest(body)) for body in bodies))
+        # by some 4.4 strain with a Poisson's ratio of 0.49. `substeps` has room for 2.7. As if tetrahedra bore
+        # all that energy alike: those at corners are squeezed more, but few of them, and `stiffest` is for all at once.
+        fallen = self.density * self.gravity * (self.height + self.size)
+        room = max(1.0, math.sqrt(2.7 * fallen / self.stiffness))
+        parts = [squeezed(fallen / _modulus(body)) for body in bodies]
+        steps = [substeps(solver, *stiffest(body, part)) for body, part in zip(bodies, parts, strict=True)]
+        count = math.ceil(room * max(steps))
         width = 2.0 * self.size * self.jellies
         looks = {
             name: Look(color=color, pattern="checker", pattern_color=other, pattern_count=4)
@@ -120,7 +124,8 @@ class JellyScene(ShippedScene):
         )
 
     def check(self, frames: Sequence[Frame]) -> None:
-        """Nobody is in the floor, no energy comes from nowhere, and no jelly has lost its volume or is torn apart."""
+        """Nobody is in the floor, no energy comes from nowhere, no tetrahedron was ever flat or inside out, and no
+        jelly has lost its volume or is torn apart."""
         last = frames[-1]
         lowest = min(float(f.positions[:, 1].min()) for f in frames)
         expect(lowest >= -1e-6, f"a jelly sank {-lowest:.2g} m into the floor")
@@ -130,10 +135,26 @@ class JellyScene(ShippedScene):
         expect(lost >= -allowed, f"the jellies gained {-lost:.2g} J")
         first = 0
         for k, body in enumerate(self.bodies()):
-            x = last.positions[first : first + len(body.particles)]
-            first += len(x)
+            mine = slice(first, first + len(body.particles))
+            first, x = mine.stop, last.positions[mine]
+            bulk = _bulk(body)
+            rest = bulk.rests(body.particles, 0.0)
+            for frame in frames:
+                flat = bool((bulk.at(frame.positions[mine][bulk.ids]) / rest).min() <= 0)
+                expect(not flat, f"a part of jelly {k + 1} is flat or inside out in frame {frame.number}")
             a, b, c = np.moveaxis(x[body.triangles], 1, 0)
             part = float((a * np.cross(b, c)).sum() / 6) / self.size**3
             expect(0.5 < part < 1.5, f"jelly {k + 1} has {100 * part:.0f}% of its volume")
             wide = float(np.ptp(x, axis=0).max())
             expect(wide < 2.5 * self.size, f"jelly {k + 1}, {self.size} m across at first, is {wide:.2f} m wide")
+
+
+def _bulk(body: Body) -> Bulk:
+    return next(force for force in body.forces if isinstance(force, Bulk))
+
+
+def _modulus(body: Body) -> float:
+    """k_s rest of its tetrahedra [Pa]: what they add to a modulus of the body."""
+    bulk = _bulk(body)
+    k_s = bulk.settings(body.particles, 0.0, np.arange(len(bulk.ids)))["k_s"][0]
+    return float((k_s * bulk.rests(body.particles, 0.0)).max())

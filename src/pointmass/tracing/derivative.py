@@ -64,10 +64,10 @@ def jacobian(program: Program, arguments: Sequence[str]) -> Program:
     return Program(program.nodes, [rows[a][o] for o in range(len(program.outputs)) for a in range(len(arguments))])
 
 
-def gradient(value: Any, vector: Sequence[Symbol]) -> tuple[Any, Any, Any]:
-    """Exact gradient of a traced number with respect to a vector argument of the law."""
+def gradient(value: Any, vector: Sequence[Symbol]) -> tuple[Any, ...]:
+    """Exact gradient of a traced number with respect to a vector argument of the law, or other numbers in it."""
     if not isinstance(value, Symbol):
-        return 0.0, 0.0, 0.0
+        return (0.0,) * len(vector)
     program, inputs = value.program, {c.node for c in vector}
     inner = set(inputs)  # nodes that depend on the inputs
     for i in range(value.node + 1):
