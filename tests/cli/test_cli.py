@@ -223,7 +223,7 @@ def test_render_of_a_divergence_holds_what_came_before(folder: Path) -> None:
 
 def test_export_writes_arrays(folder: Path) -> None:
     pointmass("run", "a.toml")
-    assert pointmass("export", "a.zarr", "-o", "a.npz").exit_code == 0
+    assert pointmass("export", "a.zarr", "a.npz").exit_code == 0
     with np.load("a.npz") as data:
         assert data["positions"].tobytes() == np.stack([f.positions for f in Cache.open("a.zarr")]).tobytes()
 
@@ -231,12 +231,12 @@ def test_export_writes_arrays(folder: Path) -> None:
 def test_export_writes_the_surfaces_of_a_frame(folder: Path) -> None:
     (folder / "sheet.toml").write_text('frames = 3\n[[bodies]]\ntype = "cloth"\nrows = 3\ncols = 3\n')
     pointmass("run", "sheet.toml")
-    assert pointmass("export", "sheet.zarr", "-o", "s.ply", "--frame", "0").exit_code == 0
+    assert pointmass("export", "sheet.zarr", "s.ply", "--frame", "0").exit_code == 0
     assert (folder / "s.ply").read_bytes().startswith(b"ply")
-    assert pointmass("export", "sheet.zarr", "-o", "s_%02d.obj").exit_code == 0
+    assert pointmass("export", "sheet.zarr", "s_%02d.obj").exit_code == 0
     assert sorted(p.name for p in folder.glob("s_*.obj")) == ["s_00.obj", "s_01.obj", "s_02.obj"]
-    late = pointmass("export", "sheet.zarr", "-o", "s.glb", "--frame", "3")
-    assert "--frame 3 is not allowed: the cache has the frames 0 to 2" in late.stderr
+    late = pointmass("export", "sheet.zarr", "s.glb", "--frame", "3")
+    assert "--frame 3 is not allowed: there are the frames 0 to 2" in late.stderr
 
 
 def test_check_says_what_is_safe(folder: Path) -> None:
@@ -508,11 +508,11 @@ def test_bad_renders(old_files: Path, monkeypatch: pytest.MonkeyPatch, arguments
         (["render", "old.zarr", "-o", "x.mp4", "--dt", "0.1"], "--dt cannot change the cache"),
         (["render", "old.zarr", "-o", "x.mp4", "--set", "a=1"], "--set cannot change the cache"),
         (["render", "old.zarr", "-o", "x.png", "--frame", "2"], "there are 2 frames"),
-        (["export", "old.zarr"], "Missing option '-o'"),
-        (["export", "old.zarr", "-o", "x.csv"], "unknown kind of export '.csv'"),
-        (["export", "old.zarr", "-o", "none/x.npz"], "there is no folder"),
-        (["export", "none.zarr", "-o", "x.npz"], "there is no such folder"),
-        (["export", "folder.mp4", "-o", "x.npz"], "is not a pointmass cache"),
+        (["export", "old.zarr"], "Missing argument 'OUT'"),
+        (["export", "old.zarr", "x.xyz"], "unknown kind of export '.xyz'"),
+        (["export", "old.zarr", "none/x.npz"], "there is no folder"),
+        (["export", "none.zarr", "x.npz"], "there is no such folder"),
+        (["export", "folder.mp4", "x.npz"], "is not a pointmass cache"),
         (["check", "pendlum"], "unknown scene"),
         (["new", "scene.txt"], "ends in .toml"),
         (["new", "none/scene.toml"], "cannot write 'none/scene.toml'"),
@@ -536,7 +536,7 @@ def test_a_full_disk_is_said_and_nothing_is_left(old_files: Path, monkeypatch: p
 def test_a_damaged_cache_is_refused(old_files: Path) -> None:
     (old_files / "old.zarr/frames/000001/positions/c.0.0").write_bytes(b"junk")
     assert_refused(old_files, ["render", "old.zarr", "-o", "old.mp4"], "frame 1 of the cache 'old.zarr' cannot be read")
-    assert_refused(old_files, ["export", "old.zarr", "-o", "x.npz"], "frame 1 of the cache")
+    assert_refused(old_files, ["export", "old.zarr", "x.npz"], "frame 1 of the cache")
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="nothing is read-only for root")

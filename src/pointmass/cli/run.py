@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +18,7 @@ from pointmass.cli.report import Report, counted
 from pointmass.errors import Diverged, InvalidInput
 
 if TYPE_CHECKING:
+    from pointmass.cache import Cache
     from pointmass.scene import Scene
 
 
@@ -64,6 +68,30 @@ def simulate(scene: Scene, path: Path, report: Report, quiet: bool, *, overwrite
             tick(frames)
 
         record(scene.simulation(), path, scene.frames, scene.fps, scene=scene, overwrite=overwrite, progress=count)
+
+
+@contextmanager
+def simulated(scene: Scene, output: Path, report: Report, quiet: bool) -> Iterator[Cache]:
+    """A scene in a cache beside the output that is made of it; the cache goes in the end.
+
+    Of a run that diverges it holds the frames before, and the report says so.
+
+    Raises
+    ------
+    Diverged
+        There are none.
+    """
+    from pointmass.cache import Cache
+
+    with tempfile.TemporaryDirectory(prefix=".pointmass-", dir=output.parent, ignore_cleanup_errors=True) as folder:
+        path = Path(folder) / "run.zarr"
+        try:
+            simulate(scene, path, report, quiet, overwrite=False)
+        except Diverged as error:
+            report.diverged = error
+            if not report.frames:
+                raise Diverged(f"{error}; {str(output)!r} was not written") from error
+        yield Cache.open(path)
 
 
 def _kept(error: Exception, report: Report) -> str:
