@@ -377,6 +377,27 @@ class ParticleSystem:
             force.keep(self.particles, mask)
         self.particles.keep(mask)
 
+    def put_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Have the particles of a state: see `Particles.state`. Who is not in it goes, and who is new comes.
+
+        Raises
+        ------
+        InvalidInput
+            It is that of another system: other columns, groups or order. Nothing has changed.
+        """
+        p, ids = self.particles, state["id"]
+        stays = np.isin(p.id, ids)
+        old = int(stays.sum())
+        alike = state.keys() == p.state().keys() and len(state["groups"]) == len(p.groups)
+        if not alike or not np.array_equal(p.id[stays], ids[:old]):
+            raise InvalidInput("the state is that of another system: its particles are not these")
+        if old < len(p):
+            self.remove(~stays)
+        if len(ids) > old:
+            columns = {name: state[name][old:] for name in ("m", "radius", "lifetime", "id")}
+            self.add(state["x"][old:], state["v"][old:], **columns)
+        p.put_state(state)
+
     def part(self, rows: NDArray[np.intp]) -> ParticleSystem:
         """A system of some of the particles under the same laws; this one stays as it is."""
         mask = np.zeros(len(self.particles), bool)
