@@ -154,6 +154,29 @@ def test_a_second_run_replaces_the_first_with_the_same_bits(folder: Path) -> Non
         assert a.positions.tobytes() == b.positions.tobytes()
 
 
+def test_a_run_goes_on_and_says_why_it_does_not(folder: Path) -> None:
+    run = ["run", "a.toml", "-o", "b.zarr"]
+    assert pointmass(*run, "--frames", "3").exit_code == 0
+    assert "3 frames of 'b.zarr' stay, the run goes on from there" in pointmass(*run, "--resume").stderr
+    done = pointmass(*run)
+    assert "nothing to do: the scene has not changed since 'b.zarr' was made" in done.stderr
+    assert pointmass("why", "b.zarr").stdout == "nothing has changed: 4 frames\n"
+    text = (folder / "a.toml").read_text()
+    (folder / "a.toml").write_text(text.replace("frames = 4", "frames = 4\nseed = 5"))
+    assert pointmass("why", "b.zarr").stdout.splitlines() == [
+        "seed: the default -> 5",
+        "a run keeps 0 frames of 4, and makes the rest again",
+    ]
+    told = json.loads(pointmass("why", "b.zarr", "a.toml", "--set", "seed=6", "--json").stdout)
+    assert (told["changes"], told["kept"]) == ([{"path": "seed", "old": None, "new": 6}], 0)
+    refused = pointmass(*run, "--resume")
+    assert refused.exit_code == 2
+    assert "--resume finds another scene in 'b.zarr' (seed: the default -> 5)" in refused.stderr
+    assert "the scene has changed (seed: the default -> 5): all frames are made again" in pointmass(*run).stderr
+    assert "4 frames in" in pointmass(*run, "--anew").stderr
+    assert len(Cache.open("b.zarr")) == 4
+
+
 def test_a_divergence_keeps_the_frames_before_it(folder: Path) -> None:
     done = pointmass("run", "bursting.toml", "-o", "d.zarr", "--json")
     assert done.exit_code == 3
@@ -508,6 +531,9 @@ def test_bad_renders(old_files: Path, monkeypatch: pytest.MonkeyPatch, arguments
         (["render", "old.zarr", "-o", "x.mp4", "--dt", "0.1"], "--dt cannot change the cache"),
         (["render", "old.zarr", "-o", "x.mp4", "--set", "a=1"], "--set cannot change the cache"),
         (["render", "old.zarr", "-o", "x.png", "--frame", "2"], "there are 2 frames"),
+        (["run", "a.toml", "-o", "x.zarr", "--resume"], "--resume finds no cache 'x.zarr'"),
+        (["run", "a.toml", "--resume", "--anew"], "--resume and --anew cannot both be wanted"),
+        (["why", "none.zarr"], "there is no such folder"),
         (["export", "old.zarr"], "Missing argument 'OUT'"),
         (["export", "old.zarr", "x.xyz"], "unknown kind of export '.xyz'"),
         (["export", "old.zarr", "none/x.npz"], "there is no folder"),
