@@ -21,4 +21,5 @@ SMALL: dict[str, dict[str, object]] = {  # fewer particles where the default tak
     "heap": {"cloths": 2, "particles": 10},
     "hair": {"strands": 16, "children": 2},
     "school": {"fish": 16},
+    "aquarium": {"school": 6, "grazers": 1, "food": 8, "plants": 6, "stones": 1},
 }

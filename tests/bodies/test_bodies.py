@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -104,6 +106,32 @@ def test_scatter_is_inside_its_box_and_keyed_by_seed() -> None:
     np.testing.assert_array_equal(more.x[:500], one.x)
 
 
+def test_forces_of_one_law_are_one_force_and_the_bits_stay() -> None:
+    bodies = [pm.fish(length=0.3), pm.jelly((3, 3, 3)), pm.fish(2, [(0, 1, 0), (0, 2, 0)], length=0.2, drag=300.0)]
+    apart, forces = pm.Particles(np.zeros((0, 3))), []
+    for body in bodies:
+        offset = len(apart)
+        apart.add(body.particles.x, m=body.particles.m)
+        forces += [copy.deepcopy(force).shifted(offset) for force in body.forces]
+    together, own = join(bodies, ["one", "block", "two"], np.float64)
+    assert len(own) == len(bodies[0].forces) + len(bodies[1].forces)
+    water = next(f for f in own if isinstance(f, pm.Water))
+    assert water.parameters["drag"].components[0].value.shape == (len(water.ids),)  # each has its own
+    assert next(f for f in own if isinstance(f, pm.Muscles)).family == "muscles"
+    states = []
+    for p, acting in ((apart, forces), (together, own)):
+        p.v[:] = np.sin(np.arange(3 * len(p))).reshape(-1, 3)
+        sim = pm.Simulation(pm.ParticleSystem(p, acting), dt=1 / 960)
+        sim.step(20)
+        states.append(sim.system.particles.x.copy())
+    np.testing.assert_array_equal(*states)
+    other = pm.chain(2)
+    other.forces[0].enabled = False
+    assert len(join([pm.chain(2), other], ["a", "b"], np.float64)[1]) == 2
+    blown = [pm.Body(pm.cloth(3, 3).particles, [pm.PlateWind([(0, 1, 3)], velocity=(k, 0, 0))]) for k in (1.0, 2.0)]
+    assert len(join(blown, ["a", "b"], np.float64)[1]) == 2
+
+
 def test_join_shifts_springs_and_names_groups() -> None:
     a, b = pm.chain(2, mass=1.0), pm.points([[5, 5, 5]], pinned=[0], attributes={"charge": 2.0})
     c = pm.chain(1, pinned="end", mass=1.0)
@@ -113,7 +141,7 @@ def test_join_shifts_springs_and_names_groups() -> None:
     np.testing.assert_array_equal(particles.select("stick"), [4, 5])
     np.testing.assert_array_equal(particles.pinned, [True, False, False, True, False, True])
     np.testing.assert_array_equal(particles.column("charge"), [0, 0, 0, 2, 0, 0])
-    assert [f.ids.tolist() for f in forces] == [[[0, 1], [1, 2]], [[4, 5]]]
+    assert [f.ids.tolist() for f in forces] == [[[0, 1], [1, 2], [4, 5]]]
     with pytest.raises(InvalidInput, match="different names"):
         join([pm.chain(1), pm.chain(1)], ["a", "a"], np.float64)
 

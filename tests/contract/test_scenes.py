@@ -23,7 +23,7 @@ VARIANTS = [(name, SMALL.get(name, {})) for name in SCENES] + [
     ("field", {"drop": "cloth", "arrows": 6, "streamlines": 6}),
     ("field", {"drop": "hair", "arrows": 6, "streamlines": 6}),
 ]
-FRAMES = {"field": 60, "drape": 90, "hair": 120, "jelly": 90, "net": 60, "fish": 60, "school": 60}  # 150 show no more
+FRAMES = {"orbit": 150, "pendulum": 150}  # whole turns and swings; of others the first second shows as much
 
 
 def frames_of(scene: Scene, count: int) -> list[Frame]:
@@ -42,12 +42,12 @@ def made(name: str, settings: dict[str, object]) -> ShippedScene:
 def test_scene_passes_its_check_and_repeats_its_bits(name: str, settings: dict[str, object]) -> None:
     shipped = made(name, settings)
     scene = shipped.build()
-    count = min(scene.frames, FRAMES.get(name, 150))
+    count = min(scene.frames, FRAMES.get(name, 60))
     first = frames_of(scene, count)
     shipped.check(first)
     assert all(np.isfinite(f.positions).all() and np.isfinite(f.velocities).all() for f in first)
-    again = frames_of(Scene.from_toml(scene.to_toml()), 30)
-    assert bits(again) == bits(first[:30])
+    again = frames_of(Scene.from_toml(scene.to_toml()), 10)
+    assert bits(again) == bits(first[:10])
 
 
 FEW: dict[str, dict[str, object]] = {  # of scenes with a cloth that are made for implicit steps

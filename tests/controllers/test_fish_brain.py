@@ -46,7 +46,7 @@ def test_the_beat_goes_on_where_it_is_when_its_frequency_changes():
 
 def test_a_fish_reaches_its_goal():
     goal = np.array([0.5, 0.05, 0.45])
-    sim = pm.Simulation(system(), dt=DT, controllers=[pm.Swim("fish", tuple(goal))])
+    sim = pm.Simulation(system(), dt=DT, controllers=[pm.Swim("fish", tuple(goal))], compiled=True)
     nearest = min(float(np.linalg.norm(f.positions[0] - goal)) for f in sim.frames(80, 10))
     assert nearest < 0.5 * LENGTH
 
@@ -54,7 +54,7 @@ def test_a_fish_reaches_its_goal():
 def test_a_hungry_fish_eats_what_it_sees_and_food_comes_again():
     food = [(0.7, 0.0, 0.3)]
     brain = pm.FishBrain("fish", food="food", mood=0.0, appetite=50.0, feeding=(5.0, 0.0, 0.0, 0.1, 0.1, 0.1))
-    sim = pm.Simulation(system(extra=food), dt=DT, controllers=[brain])
+    sim = pm.Simulation(system(extra=food), dt=DT, controllers=[brain], compiled=True)
     sim.run(8.0)
     assert brain.memory["eaten"].tolist() == [1.0]
     np.testing.assert_allclose(sim.system.particles.x[-1], (5, 0, 0), atol=0.06)
@@ -97,7 +97,7 @@ def test_what_brains_do_not_take():
         pm.Simulation(system(extra=[(1.0, 0, 0)]), controllers=[pm.Swim("food")])
     with pytest.raises(InvalidInput, match="unknown group of particles 'cat'"):
         pm.Simulation(system(), controllers=[pm.FishBrain("cat")])
-    with pytest.raises(InvalidInput, match="unknown kind of fish 'shark'"):
+    with pytest.raises(InvalidInput, match="unknown value of kinds: 'shark'"):
         pm.FishBrain(kinds="shark")
     with pytest.raises(InvalidInput, match="kinds has 1 entries for 2 bodies"):
         pm.FishBrain(["a", "b"], ["prey"])

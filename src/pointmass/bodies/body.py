@@ -84,6 +84,9 @@ def pin_parts(particles: Particles, pinned: Any) -> None:
 def join(bodies: Sequence[Body], names: Sequence[str], dtype: Any) -> tuple[Particles, list[Force]]:
     """One set of particles from several bodies, each a group under its name, and all their forces.
 
+    Forces of the same law are one force, with the elements of all the bodies: one kernel for all, and the same sums,
+    as no particle has elements of two bodies and each keeps the order of its own.
+
     A body's own group, such as "top edge", is a group "NAME top edge"; where no other body has one of that name, also
     "top edge". Its surface and its skin have its name.
 
@@ -113,9 +116,25 @@ def join(bodies: Sequence[Body], names: Sequence[str], dtype: Any) -> tuple[Part
             skin = drawn.skin and drawn.skin.shifted(offset)
             whole.cover(called, drawn.triangles + offset, drawn.uv, drawn.inside + offset, skin)
         whole.pin(rows[p.pinned])
+        place = 0  # in `forces`, from which on the body's next force may be: its own keep their order
         for force in part.forces:
-            forces.append(force.shifted(offset) if isinstance(force, ElementForce) else _limited(force, rows))
+            if isinstance(force, ElementForce):
+                force.shifted(offset)
+                place = _put(force, forces, place) + 1
+            else:
+                forces.append(_limited(force, rows))
+                place = len(forces)
     return whole, forces
+
+
+def _put(force: ElementForce, forces: list[Force], begin: int) -> int:
+    """Where a force is now: in the first one from `begin` on that can have its elements, or by itself at the end."""
+    for k, mate in enumerate(forces[begin:], begin):
+        if isinstance(mate, ElementForce) and mate.joins(force):
+            mate.take_in(force)
+            return k
+    forces.append(force)
+    return len(forces) - 1
 
 
 def _limited(force: Force, rows: Any) -> Force:

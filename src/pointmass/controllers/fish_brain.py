@@ -44,7 +44,8 @@ class FishBrain(Controller):
     on : name of a body of fish, or of several.
     kinds : of each body: "prey" fears predators, "predator" eats prey, "pacifist" does neither; one for all, or a list.
     food : name of the group of particles that prey and pacifists eat; "" = none.
-    schools : who swims together with others of its body: "none", "when afraid" or "always" (for want of other wishes).
+    schools : who swims together with others of its body: "none", "when afraid" or "always" (for want of other wishes);
+        one for all, or a list.
     sight : how far they see [m].
     smell : how far they smell food [m].
     home : middle [m] and radius [m] of the water in which they stay, four numbers.
@@ -78,7 +79,7 @@ class FishBrain(Controller):
         on: str | Sequence[str] = "fish",
         kinds: str | Sequence[str] = "prey",
         food: str = "",
-        schools: str = "when afraid",
+        schools: str | Sequence[str] = "when afraid",
         sight: float = 2.0,
         smell: float = 3.0,
         home: Any = (0.0, 0.0, 0.0, 3.0),
@@ -100,15 +101,9 @@ class FishBrain(Controller):
     ) -> None:
         super().__init__(period)
         self.on = [on] if isinstance(on, str) else list(on)
-        self.kinds = [kinds] * len(self.on) if isinstance(kinds, str) else list(kinds)
-        if not self.on or len(self.kinds) != len(self.on):
-            raise InvalidInput(f"kinds has {len(self.kinds)} entries for {len(self.on)} bodies: give one for each")
-        for kind in self.kinds:
-            if kind not in KINDS:
-                raise unknown("kind of fish", kind, KINDS)
-        if schools not in HABITS:
-            raise unknown("value of schools:", schools, HABITS)
-        self.food, self.schools = food, schools
+        self.kinds = self._of_bodies("kinds", kinds, KINDS)
+        self.schools = self._of_bodies("schools", schools, HABITS)
+        self.food = food
         self.sight = number("sight", sight, above=0, unit="m")
         self.smell = number("smell", smell, at_least=0, unit="m")
         place = finite_array("home", home, (4,))
@@ -144,6 +139,7 @@ class FishBrain(Controller):
         self._food = p.id[p.select(self.food)] if self.food else np.zeros(0, np.int64)
         kinds = np.array([KINDS.index(kind) for kind in self.kinds])[fish.kind]
         self._prey, self._predator = kinds == 0, kinds == 1
+        self._habit = np.array([HABITS.index(habit) for habit in self.schools])[fish.kind]
         n = len(fish)
         ages = self.mood * random.uniform(seed, "fish", fish.ids, "mood")
         zero = np.zeros(n)
@@ -186,6 +182,16 @@ class FishBrain(Controller):
         self._eat(system, t, seen, look)
 
     # ------------------------------------------------------------------------------------------------ inside
+
+    def _of_bodies(self, name: str, value: str | Sequence[str], allowed: Sequence[str]) -> list[str]:
+        """One of the allowed words for each body."""
+        words = [value] * len(self.on) if isinstance(value, str) else list(value)
+        if not self.on or len(words) != len(self.on):
+            raise InvalidInput(f"{name} has {len(words)} entries for {len(self.on)} bodies: give one for each")
+        for word in words:
+            if word not in allowed:
+                raise unknown(f"value of {name}:", word, allowed)
+        return words
 
     def _look(
         self, system: ParticleSystem, t: float, nose: Array, middle: Array, heading: Array, axis: Array, food: Array
@@ -300,15 +306,14 @@ class FishBrain(Controller):
             loving,
             before,
             seen.suits,
-            np.full(len(length), self.schools != "none"),
+            self._habit > 0,
             coin,
             afraid=self.afraid,
             panic=self.panic,
             urge=self.urge,
         )
-        if self.schools == "always":
-            doing = np.where((doing == order.WANDER) & ~self._predator, order.SCHOOL, doing)
-        return doing
+        idle = (doing == order.WANDER) & (self._habit == HABITS.index("always")) & ~self._predator
+        return np.where(idle, order.SCHOOL, doing)
 
     def _eat(self, system: ParticleSystem, t: float, seen: Seen, look: int) -> None:
         """Meals, matings, and those who come anew."""

@@ -63,17 +63,18 @@ class Steer(Controller):
         """Find the body's muscles, and see that the goal can be reached."""
         p = system.particles
         mine = self._ids(p, "")
-        found = [f for f in system.forces if isinstance(f, Muscles) and np.isin(f.ids, mine).all()]
+        found = [(f, f.among(mine)) for f in system.forces if isinstance(f, Muscles)]
+        found = [(force, rows) for force, rows in found if len(rows)]
         if not found:
             raise InvalidInput(f"controller steer needs muscles, and body {self.on!r} has none")
-        self.check_goal(system, self.goal)
-        self._muscles = found
         left, right = self._ids(p, "left"), self._ids(p, "right")
-        self._sides = [np.isin(f.ids, left).all(axis=1) * 1.0 - np.isin(f.ids, right).all(axis=1) for f in found]
-        self._offsets = []
-        for force in found:
-            force.parameters["offset"].each(len(force.ids), force.name)
-            self._offsets.append(np.array(force.parameters["offset"].components[0].value))
+        self._muscles = []
+        for force, rows in found:
+            offset = force.parameters["offset"]
+            offset.each(len(force.ids), force.name)
+            side = np.isin(rows, force.among(left)) * 1.0 - np.isin(rows, force.among(right))
+            self._muscles.append((force, rows, side, np.array(offset.components[0].value)[rows]))
+        self.check_goal(system, self.goal)
         self._ends = self._ids(p, "head"), self._ids(p, "tail")
         self.memory = {"heading": self._heading(p)}
 
@@ -87,8 +88,8 @@ class Steer(Controller):
             across = np.cross(heading, way)
             angle = math.atan2(float(self.up @ across), float(heading @ way - (self.up @ heading) * (self.up @ way)))
             turn = self.most * angle / (abs(angle) + self.tolerance)
-        for force, side, offset in zip(self._muscles, self._sides, self._offsets, strict=True):
-            force.put(offset=offset - turn * side)
+        for force, rows, side, offset in self._muscles:
+            force.put(rows, offset=offset - turn * side)
 
     def _heading(self, p: Particles) -> Any:
         head, tail = (p.x[p.rows(ids)].mean(axis=0, dtype=np.float64) for ids in self._ends)

@@ -14,7 +14,8 @@ from pointmass.collisions.collider import directions, lengths
 from pointmass.errors import InvalidInput
 from pointmass.forces.fins import Fins
 from pointmass.forces.muscles import Muscles
-from pointmass.laws.force import Force
+from pointmass.laws.elements import ElementForce
+from pointmass.laws.force import Rows
 from pointmass.particles import Particles
 from pointmass.system import ParticleSystem
 from pointmass.tracing import functions as fn  # the same bits on every machine
@@ -52,28 +53,26 @@ class Swimmers:
     def __init__(self, system: ParticleSystem, names: Sequence[str]) -> None:
         p = system.particles
         found: list[NDArray[np.int64]] = []
-        self._muscles: list[tuple[Force, slice]] = []
-        self._fins: list[tuple[Force, slice]] = []
+        self._muscles: list[tuple[ElementForce, Rows, slice]] = []  # with the numbers of those of a body, and its fish
+        self._fins: list[tuple[ElementForce, Rows, slice]] = []
         first = 0
         for name in names:
             mine = p.id[p.select(name)]
-            parts: dict[type[Force], Force] = {}
-            for force in system.forces:
-                if isinstance(force, (Muscles, Fins)) and len(force.ids) and np.isin(force.ids, mine).all():
-                    parts[type(force)] = force
             fish, rest = divmod(len(mine), NODES)
-            if set(parts) != {Muscles, Fins} or rest or len(parts[Muscles].ids) != MUSCLES * fish:  # type: ignore[attr-defined]
-                raise InvalidInput(f"{name!r} has no muscles and fins of fish: it must be a body made by pm.fish()")
+            for kind, each, own in ((Muscles, MUSCLES, self._muscles), (Fins, 1, self._fins)):
+                parts = [(f, f.among(mine)) for f in system.forces if isinstance(f, kind)]
+                parts = [(force, rows) for force, rows in parts if len(rows)]
+                if rest or len(parts) != 1 or len(parts[0][1]) != each * fish:
+                    raise InvalidInput(f"{name!r} has no muscles and fins of fish: it must be a body made by pm.fish()")
+                own.append((*parts[0], slice(first, first + fish)))
             found.append(mine.reshape(fish, NODES))
-            self._muscles.append((parts[Muscles], slice(first, first + fish)))
-            self._fins.append((parts[Fins], slice(first, first + fish)))
             first += fish
         self._nodes = np.concatenate(found)
         self._rows = -1, np.zeros(0, np.intp)
         self.ids = self._nodes[:, NOSE]
         self.kind = np.repeat(np.arange(len(names)), [len(part) for part in found])
         first_muscle = np.linalg.norm(SHAPE[GRAPH["muscles"][0, 0]] - SHAPE[GRAPH["muscles"][0, 1]])
-        rests = [force.settings(p, system.t, np.arange(len(force.ids)))["rest"][0] for force, _ in self._muscles]  # type: ignore[attr-defined]
+        rests = [force.settings(p, system.t, rows)["rest"][0] for force, rows, _ in self._muscles]
         self.length = np.concatenate([rest[::MUSCLES] for rest in rests]).astype(np.float64) / first_muscle
 
     def __len__(self) -> int:
@@ -126,10 +125,10 @@ class Swimmers:
             "frequency": np.repeat(frequency[:, None], MUSCLES, axis=1),
             "phase": start[:, None] - LAG * SEGMENTS,
         }
-        for force, part in self._muscles:
-            force.put(**{name: value[part].ravel() for name, value in values.items()})
-        for force, part in self._fins:
-            force.put(angle=angle[part])
+        for force, rows, part in self._muscles:
+            force.put(rows, **{name: value[part].ravel() for name, value in values.items()})
+        for force, rows, part in self._fins:
+            force.put(rows, angle=angle[part])
 
     def steer(self, heading: Array, way: Array) -> tuple[Array, Array]:
         """How much each should turn, from -1 (right) to 1 (left), and the angle of its fins, to head along `way`.

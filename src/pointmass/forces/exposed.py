@@ -36,6 +36,9 @@ class Exposed(ElementForce):
         self.air.bind(particles)
         super().bind(particles)
 
+    def joins(self, other: ElementForce) -> bool:
+        return isinstance(other, Exposed) and super().joins(other) and self.air.same(other.air)
+
 
 class Plates(Exposed):
     """One on triangles, which may be those of a surface, by its name."""
@@ -52,6 +55,9 @@ class Plates(Exposed):
                 raise unknown("surface", self._surface, particles.surfaces)
             self.ids = particles.surfaces[self._surface].triangles
         super().bind(particles)
+
+    def joins(self, other: ElementForce) -> bool:
+        return self._surface is None and isinstance(other, Plates) and other._surface is None and super().joins(other)
 
     def exposed(self, state: Any, t: Any, velocity: Any) -> tuple[Any, Any, Any]:
         """From places and velocities of the corners in turn: the normal, as long as the area; the mean velocity of the

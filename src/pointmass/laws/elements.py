@@ -195,6 +195,24 @@ class ElementForce(Force):
         self._rows = None
         return self
 
+    def among(self, ids: NDArray[np.int64]) -> Rows:
+        """Numbers of the elements that join particles with some ids alone."""
+        return np.flatnonzero(np.isin(self.ids, ids).all(axis=1))
+
+    def joins(self, other: ElementForce) -> bool:
+        """Whether one force can have the elements of both: the same law, with other numbers at most."""
+        alike = type(self) is type(other) and (self.family, self.enabled) == (other.family, other.enabled)
+        if not alike or self.parameters.keys() != other.parameters.keys():
+            return False
+        return all(p.joins(other.parameters[name]) for name, p in self.parameters.items())
+
+    def take_in(self, other: ElementForce) -> None:
+        """Have the elements of another force that `joins`, after one's own."""
+        for name, p in self.parameters.items():
+            p.take_in(other.parameters[name], len(self.ids), len(other.ids))
+        self.ids = np.concatenate([self.ids, other.ids])
+        self._rows = None
+
     @cached_property
     def _jacobian(self) -> Traced:
         names = [n for a in range(self.nodes) for q in "xv" for n in vector_names(f"{q}{a + 1}")]

@@ -176,8 +176,13 @@ class Force(Described, ABC):
             raise
         self.arguments = fresh.arguments
 
-    def put(self, **values: Any) -> None:
+    def put(self, rows: Rows | None = None, **values: Any) -> None:
         """Set numbers of parameters quickly, as controllers do between steps: they are checked, and not described.
+
+        Parameters
+        ----------
+        rows : of the elements or particles whose numbers change, where each has its own; None = all.
+        values : one number, or one for each, by name of the parameter.
 
         Raises
         ------
@@ -188,7 +193,7 @@ class Force(Described, ABC):
             if name not in self.parameters:
                 raise unknown(f"parameter of {self.called}", name, self.parameters)
             with about(self.called):
-                self.parameters[name].put(value)
+                self.parameters[name].put(value, rows)
 
     @property
     @abstractmethod

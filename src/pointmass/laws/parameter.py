@@ -156,23 +156,33 @@ class Parameter:
             if c.formula is not None:
                 c.formula.restrict(["t", *particles.columns])
 
-    def put(self, values: Any) -> None:
+    def put(self, values: Any, rows: NDArray[np.bool_] | Rows | None = None) -> None:
         """Have other numbers, which are checked like those before: one, or one for each thing that has one.
+
+        Parameters
+        ----------
+        rows : of the things whose numbers change, where each has its own; None = all.
 
         Raises
         ------
         InvalidInput
-            A number that is not allowed, another count than before, a parameter that is a function of t or a vector.
+            A number that is not allowed, another count than before, a parameter that is a function of t or a vector, or
+            that is one number where only some should change.
         """
         (component, *more) = self.components
         if more or isinstance(component.value, Traced):
             raise InvalidInput(f"{self.name} cannot be controlled: it is a vector or a function of t")
         old, array = component.value, np.asarray(values, np.float64)
-        if array.ndim > 1 or (isinstance(old, np.ndarray) and array.ndim and array.shape != old.shape):
-            raise InvalidInput(f"{self.name} takes one number or {np.shape(old)}, not an array of shape {array.shape}")
+        if rows is not None and not isinstance(old, np.ndarray):
+            raise InvalidInput(f"{self.name} is one number for all: give each its own, if only some should change")
+        shape = np.shape(old if rows is None else old[rows])  # type: ignore[index]
+        if array.ndim > 1 or (isinstance(old, np.ndarray) and array.ndim and array.shape != shape):
+            raise InvalidInput(f"{self.name} takes one number or {shape}, not an array of shape {array.shape}")
         component._check(array)
         if isinstance(old, np.ndarray):
-            array = np.broadcast_to(array, old.shape)
+            whole = old.copy()
+            whole[slice(None) if rows is None else rows] = array
+            array = whole
         component.value = read_only(array.copy()) if array.ndim else float(array)
 
     @property
@@ -183,6 +193,17 @@ class Parameter:
     def numbers(self) -> NDArray[np.float64]:
         """The number or numbers of one that `may_be_put`, shape () or (rows,)."""
         return np.asarray(self.components[0].value, np.float64)
+
+    def joins(self, other: Parameter) -> bool:
+        """Whether a column can hold the numbers of both: functions of t must be the same."""
+        return self.vector == other.vector and all(map(_alike, self.components, other.components))
+
+    def take_in(self, other: Parameter, count: int, more: int) -> None:
+        """Have the numbers of another one, for `more` things, after one's own `count`; one that both share stays."""
+        for mine, its in zip(self.components, other.components, strict=True):
+            a, b = mine.value, its.value
+            if not isinstance(a, Traced) and not isinstance(b, Traced) and (np.ndim(a) or np.ndim(b) or a != b):
+                mine.value = read_only(np.concatenate([np.broadcast_to(a, count), np.broadcast_to(b, more)]))
 
     def twin(self) -> Parameter:
         """The same parameter once more, whose columns can follow other particles."""
@@ -233,6 +254,13 @@ class Parameter:
         if len(parts) not in (2, 3):
             raise InvalidInput(f"{self.name} must be a function of t that returns three numbers, not {len(parts)}")
         return [*parts, 0.0][axis]
+
+
+def _alike(a: Component, b: Component) -> bool:
+    """Whether both are numbers, or both the same function."""
+    if not isinstance(a.value, Traced) or not isinstance(b.value, Traced):
+        return not isinstance(a.value, Traced) and not isinstance(b.value, Traced)
+    return a.needs == b.needs and a.value.program.text == b.value.program.text
 
 
 def _ndim(value: Any) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pointmass.scenes.aquarium import Aquarium
 from pointmass.scenes.base import CheckFailed, ShippedScene
 from pointmass.scenes.bounce import Bounce
 from pointmass.scenes.cloth import ClothScene
@@ -57,6 +58,7 @@ SCENES: dict[str, type[ShippedScene]] = {
         WormScene,
         FishScene,
         School,
+        Aquarium,
     )
 }
 
