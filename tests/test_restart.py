@@ -106,6 +106,18 @@ def test_a_run_that_tears_says_that_its_state_is_not_all() -> None:
     assert shipped("fish")().restless == ""
 
 
+def test_a_brain_that_remembers_words_says_so() -> None:
+    class Talker(pm.Controller):
+        def bind(self, system: pm.ParticleSystem, seed: int) -> None:
+            self.memory = {"said": "hello"}
+
+        def control(self, system: pm.ParticleSystem, t: float) -> None:
+            """Nothing more to say."""
+
+    sim = pm.Simulation(pm.ParticleSystem(pm.chain(2).particles), controllers=[Talker()])
+    assert sim.restless == "what Talker remembers as 'said' is no array of numbers"
+
+
 def test_a_brain_goes_on_with_its_memory() -> None:
     whole, again = (shipped("fish")() for _ in range(2))
     whole.step(2 * CHECKPOINT)

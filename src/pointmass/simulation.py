@@ -303,6 +303,10 @@ class Simulation:
         for constraint in self.constraints:
             if constraint.breaks_up:
                 return f"{type(constraint).__name__} changes who is joined to whom"
+        for controller in self.controllers:
+            for name, values in controller.memory.items():
+                if np.asarray(values).dtype.kind not in "biuf":
+                    return f"what {type(controller).__name__} remembers as {name!r} is no array of numbers"
         return ""
 
     def state(self) -> dict[str, NDArray[Any]]:
@@ -346,6 +350,7 @@ class Simulation:
             raise InvalidInput(f"the state is that of a run from t = {times[0]:g} s with dt = {times[1]:g} s")
         self.steps, self.frames_seen, looks = (int(k) for k in state["steps"])
         self._looks, self._speed_limit = (times[2], looks, times[3]), times[4]
+        self._looked_at_step = True  # when the run began
         self.system.put_state(groups["particles"])
         self.system.t = self.t
         self.engine.reference.remember(groups.get("solver", {}), Stats())

@@ -65,6 +65,8 @@ def test_a_stopped_run_goes_on_from_a_checkpoint_with_the_same_bits(tmp_path: Pa
     record(sim, tmp_path / "a.zarr", FRAMES, scene=scene, resume=True)
     assert sim.engine.stats.steps < 64  # of 156: the last checkpoint was at step 128
     assert_whole(tmp_path / "a.zarr", scene)
+    with pytest.raises(InvalidInput, match="resume = True is not allowed for a simulation after 156 steps"):
+        record(sim, tmp_path / "a.zarr", FRAMES, scene=scene, resume=True)
 
 
 @pytest.mark.parametrize(("name", "fps"), [("fish", 60.0), ("snake", 240.0)])

@@ -16,6 +16,7 @@ import numpy as np
 
 from pointmass.cache.drawables import folder_of, read_drawable, write_drawable
 from pointmass.cache.groups import (
+    METADATA,
     Array,
     Damaged,
     packed,
@@ -372,8 +373,9 @@ def _make(path: Path, attributes: dict[str, Any]) -> None:
 def _removed(folder: Path) -> None:
     """Take a group away: at once for all who look, then its files."""
     gone = folder.with_name(f".{folder.name}.gone")
-    shutil.rmtree(gone, ignore_errors=True)
+    shutil.rmtree(gone, ignore_errors=True)  # of a process that was killed
     folder.rename(gone)
+    (gone / METADATA).unlink(missing_ok=True)  # first: what a kill leaves behind is no group
     shutil.rmtree(gone)
 
 

@@ -113,6 +113,8 @@ def record(
     """
     path = Path(path)
     frames, fps = whole_number("frames", frames, at_least=1), number("fps", fps, above=0, unit="1/s")
+    if resume and (sim.steps or sim.frames_seen):
+        raise InvalidInput(f"resume = True is not allowed for a simulation after {sim.steps} steps: give a fresh one")
     check_target(path, overwrite or resume)
     with locked(path):
         writer = _Writer(sim, path, fps, scene, camera, overwrite or resume, progress, about or {})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 from collections.abc import Iterable
 from pathlib import Path
@@ -37,6 +38,15 @@ def write_usd(frames: Iterable[Frame], path: Path, about: About) -> None:
     the place on the pattern as `primvars:st`; hair, trails, streamlines, springs and arrows are `BasisCurves`. What
     does not change from a frame to the next is written once. Something that is not there in a frame is invisible.
     """
+    from pxr import Tf
+
+    try:
+        _write(frames, path, about)
+    except Tf.ErrorException as error:
+        raise OSError(errno.EIO, f"USD cannot write it ({error})") from error
+
+
+def _write(frames: Iterable[Frame], path: Path, about: About) -> None:
     from pxr import Usd, UsdGeom
 
     stage = Usd.Stage.CreateNew(str(path))
