@@ -333,21 +333,28 @@ class Simulation:
             groups[f"force{k}"] = {name: p.numbers() for name, p in force.parameters.items() if p.may_be_put}
         return now | {f"{group}.{name}": np.array(a) for group, found in groups.items() for name, a in found.items()}
 
+    def fits(self, state: Mapping[str, NDArray[Any]]) -> bool:
+        """Whether a state can be one of this run, which is still at its start."""
+        groups, mine = _grouped(state), _grouped(self.state())
+        kept = [{name for name in g if name.startswith(("kin", "force"))} for g in (groups, mine)]
+        begun = [float(t) for t in state["times"][:2]] == [self.t0, self.dt]
+        return begun and kept[0] == kept[1] and self.system.fits(groups["particles"])
+
     def put_state(self, state: Mapping[str, NDArray[Any]]) -> None:
         """Go on from a `state` of a simulation of the same make; this one has made no steps yet.
 
         Raises
         ------
         InvalidInput
-            It is the state of another simulation.
+            It is the state of another simulation. Nothing has changed.
         """
-        groups: dict[str, dict[str, Any]] = {}
-        for key, values in state.items():
-            group, _, name = key.partition(".")
-            groups.setdefault(group, {})[name] = values
+        groups = _grouped(state)
+        if not self.fits(state):
+            raise InvalidInput(
+                f"the state is that of another run, with {len(state['particles.id'])} particles and dt ="
+                f" {state['times'][1]:g} s"
+            )
         times = [float(t) for t in state["times"]]
-        if times[:2] != [self.t0, self.dt]:
-            raise InvalidInput(f"the state is that of a run from t = {times[0]:g} s with dt = {times[1]:g} s")
         self.steps, self.frames_seen, looks = (int(k) for k in state["steps"])
         self._looks, self._speed_limit = (times[2], looks, times[3]), times[4]
         self._looked_at_step = True  # when the run began
@@ -737,6 +744,15 @@ class Simulation:
             return None, exact
         finally:
             system.set_state(now)
+
+
+def _grouped(state: Mapping[str, NDArray[Any]]) -> dict[str, dict[str, Any]]:
+    """A state by the parts of the run that it is of."""
+    groups: dict[str, dict[str, Any]] = {}
+    for key, values in state.items():
+        group, _, name = key.partition(".")
+        groups.setdefault(group, {})[name] = values
+    return groups
 
 
 def culprit(system: ParticleSystem) -> tuple[int, str, bool, list[int]]:

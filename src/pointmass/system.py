@@ -377,22 +377,20 @@ class ParticleSystem:
             force.keep(self.particles, mask)
         self.particles.keep(mask)
 
-    def put_state(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Have the particles of a state: see `Particles.state`. Who is not in it goes, and who is new comes.
-
-        Raises
-        ------
-        InvalidInput
-            It is that of another system: other columns, groups or order. Nothing has changed.
-        """
+    def fits(self, state: Mapping[str, NDArray[Any]]) -> bool:
+        """Whether a state can be one of this system: the same columns and groups, who stays in the same order."""
         p, ids = self.particles, state["id"]
-        stays = np.isin(p.id, ids)
-        old = int(stays.sum())
+        stay = p.id[np.isin(p.id, ids)]
         alike = state.keys() == p.state().keys() and len(state["groups"]) == len(p.groups)
-        if not alike or not np.array_equal(p.id[stays], ids[:old]):
-            raise InvalidInput("the state is that of another system: its particles are not these")
-        if old < len(p):
-            self.remove(~stays)
+        return alike and np.array_equal(stay, ids[: len(stay)])
+
+    def put_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Have the particles of a state that `fits`, see `Particles.state`: some go, and some are new."""
+        p, ids = self.particles, state["id"]
+        gone = ~np.isin(p.id, ids)
+        if gone.any():
+            self.remove(gone)
+        old = len(p)
         if len(ids) > old:
             columns = {name: state[name][old:] for name in ("m", "radius", "lifetime", "id")}
             self.add(state["x"][old:], state["v"][old:], **columns)

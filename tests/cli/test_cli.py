@@ -262,6 +262,21 @@ def test_export_writes_the_surfaces_of_a_frame(folder: Path) -> None:
     assert "--frame 3 is not allowed: there are the frames 0 to 2" in late.stderr
 
 
+def test_export_takes_scenes_and_chooses_by_the_ending(folder: Path) -> None:
+    for name in ("a.usda", "a.csv", "a_%d.png"):
+        done = pointmass("export", "a.toml", name, "--frames", "2")
+        assert (done.exit_code, done.stdout) == (0, "")
+        assert re.fullmatch(rf"pointmass: 2 frames in [\d.]+ s: {re.escape(name)}\n", done.stderr)
+    names = {"a.toml", "bursting.toml", "a.usda", "a.csv", "a_0.png", "a_1.png"}
+    assert {p.name for p in folder.iterdir()} == names
+    assert "endTimeCode = 1" in (folder / "a.usda").read_text()
+    assert 'def Camera "camera"' in (folder / "a.usda").read_text()
+    burst = pointmass("export", "bursting.toml", "b.npz")
+    assert burst.exit_code == 3
+    with np.load("b.npz") as data:
+        assert f"'b.npz' holds the {len(data['time'])} frames before it" in burst.stderr
+
+
 def test_check_says_what_is_safe(folder: Path) -> None:
     result = json.loads(pointmass("check", "pendulum", "--json").stdout)
     assert set(result) == {

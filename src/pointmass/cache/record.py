@@ -64,9 +64,12 @@ def plan(path: str | Path, sim: Simulation, scene: Scene | None, fps: float) -> 
     new, old = Making.of(scene, sim, fps), Making.read(cache.attributes)
     if new is None or old is None:
         return Plan(cache, known=False)
-    if old.hash == new.hash:
-        return Plan(cache, len(cache), cache.state())
-    state = cache.state(before=old.untouched_until(new) - sim.dt)
+    same = old.hash == new.hash
+    state = cache.state() if same else cache.state(before=old.untouched_until(new) - sim.dt)
+    if state is not None and not sim.fits(state):  # an edit that changes more than it seems
+        state = None
+    if same:
+        return Plan(cache, len(cache), state)
     return Plan(cache, 0 if state is None else int(state["steps"][1]), state, old.changes(new))
 
 
@@ -80,6 +83,7 @@ def record(
     camera: Camera | None = None,
     overwrite: bool = False,
     resume: bool = False,
+    checkpoints: bool = True,
     progress: Callable[[int], None] | None = None,
     about: dict[str, Any] | None = None,
 ) -> Cache:
@@ -96,6 +100,7 @@ def record(
     resume : whether frames of a cache that is there already stay, as far as they follow from the same scene: then `sim`
         is fresh from it, and goes on from a checkpoint with the bits that it would have had. Frames that an edit of the
         scene can affect are made anew, see `plan`.
+    checkpoints : whether states are kept from which a run can go on; each takes about as much room as two frames.
     progress : called with the number of frames written so far, after each.
     about : what else the cache should know, as it can stand in JSON.
 
@@ -120,7 +125,8 @@ def record(
         writer = _Writer(sim, path, fps, scene, camera, overwrite or resume, progress, about or {})
         if resume and writer.goes_on(plan(path, sim, scene, fps), frames):
             return writer.flush()
-        writer.keep_states()
+        if checkpoints:
+            writer.keep_states()
         try:
             for frame in sim.frames(frames - sim.frames_seen if resume else frames, fps):
                 writer.add(frame, frames)
@@ -160,10 +166,7 @@ class _Writer:
         if cache is None or not found.kept:
             return False
         if found.state is not None:
-            try:
-                self._sim.put_state(found.state)
-            except InvalidInput:  # an edit that changes more than it seems
-                return False
+            self._sim.put_state(found.state)
         self._warn(cache)
         attributes = self._attributes()
         if not found.same:

@@ -76,6 +76,7 @@ def simulate(
     quiet: bool,
     *,
     mode: Mode = "",
+    checkpoints: bool = True,
     about: dict[str, Any] | None = None,
 ) -> None:
     """Simulate a scene into a cache, and count its frames in the report.
@@ -83,6 +84,7 @@ def simulate(
     Parameters
     ----------
     mode : "resume" refuses a cache of another scene, "anew" replaces one, "" keeps of it what still holds.
+    checkpoints : whether it is kept from where a run can go on.
     about : what else the cache should know.
 
     Raises
@@ -114,6 +116,7 @@ def simulate(
             scene=scene,
             overwrite=True,
             resume=mode != "anew",
+            checkpoints=checkpoints,
             progress=count,
             about=about,
         )
@@ -155,7 +158,7 @@ def simulated(scene: Scene, output: Path, report: Report, quiet: bool) -> Iterat
     with tempfile.TemporaryDirectory(prefix=".pointmass-", dir=output.parent, ignore_cleanup_errors=True) as folder:
         path = Path(folder) / "run.zarr"
         try:
-            simulate(scene, path, report, quiet)
+            simulate(scene, path, report, quiet, checkpoints=False)
         except Diverged as error:
             report.diverged = error
             if not report.frames:
