@@ -17,7 +17,7 @@ from benchmarks.page import Table, section, tables, write
 from benchmarks.probe import Machine, probe
 from benchmarks.track import run
 
-WORKLOADS = ("free", "cloth", "hair", "pairs", "implicit", "xpbd", "emit", "start")
+WORKLOADS = ("free", "cloth", "hair", "fish", "pairs", "implicit", "xpbd", "emit", "start")
 
 
 @click.command()

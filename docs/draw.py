@@ -370,6 +370,11 @@ def school():
     shipped("school", 300)
 
 
+def aquarium():
+    """The shipped scene aquarium."""
+    shipped("aquarium", 240)
+
+
 def jelly():
     """The shipped scene jelly."""
     shipped("jelly", 20)
@@ -512,6 +517,7 @@ PICTURES = (
     worm,
     fish,
     school,
+    aquarium,
     live_page,
     live_field,
 )

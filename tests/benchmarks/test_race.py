@@ -16,7 +16,7 @@ import pointmass as pm
 from benchmarks import page, race, track
 from benchmarks.probe import Machine, probe
 from benchmarks.toolchain import compiled
-from benchmarks.workloads import emit, free, hair, implicit, pairs, springs, xpbd
+from benchmarks.workloads import emit, fish, free, hair, implicit, pairs, springs, xpbd
 from benchmarks.workloads.cloth import cloth, irregular
 from benchmarks.workloads.solids import DEEP, Stone
 
@@ -158,6 +158,7 @@ FREE = partial(free.Problem, 300, substeps=32)
 RK4 = partial(free.Problem, 300, solver="rk4", mu=2.0)
 EMIT = partial(emit.Problem, 20_000)
 STONE = partial(emit.Problem, 20_000, collider=Stone(parts=10))
+SHOAL = partial(fish.shoal, 2)
 CLOTH, MESH, HAIR = partial(cloth, 8), partial(irregular, 8), partial(hair.hair, 3)
 TAUT, TAUT_MESH = partial(xpbd.taut, cloth, 17, 5), partial(xpbd.taut, irregular, 8, 1)
 HERE = [
@@ -166,6 +167,7 @@ HERE = [
     *((free, RK4, kind) for kind in (free.Pointmass, free.NumPy, free.C, free.CFused)),
     *((springs, p, kind) for p in (CLOTH, MESH, HAIR) for kind in (springs.Pointmass, springs.NumPy, springs.C)),
     (springs, HAIR, hair.NumPyStrands),
+    *((fish, SHOAL, kind) for kind in (fish.Pointmass, fish.NumPy)),
     *((pairs, partial(pairs.Bodies, 200), kind) for kind in (pairs.Pointmass, pairs.NumPy, pairs.C)),
     *((implicit, partial(implicit.drum, 8), kind) for kind in implicit.CONTESTANTS),
     *((xpbd, p, xpbd.NumPy) for p in (TAUT, TAUT_MESH)),
@@ -254,6 +256,7 @@ WRONG = [
     (implicit, partial(implicit.drum, 8), {"k_s": 9.9}),
     (xpbd, TAUT, {"iterations": 6}),
     (xpbd, TAUT_MESH, {"k_s": 1.0}),
+    (fish, SHOAL, {"upright": 8.0}),
     (emit, EMIT, {"k": 3.9}),
     (emit, EMIT, {"restitution": 0.45}),
     (emit, STONE, {"restitution": 0.45}),

@@ -13,8 +13,9 @@ def middles(frame, count):
     return frame.positions[: NODES * count].reshape(count, NODES, 3).mean(axis=1)
 
 
-@pytest.mark.parametrize("count", [30, pytest.param(200, marks=pytest.mark.full)])
-def test_a_school_keeps_together_and_apart(count):
+@pytest.mark.parametrize("count", [30, 200])
+def test_a_school_keeps_together_and_apart(count, monkeypatch):
+    monkeypatch.setenv("POINTMASS_ENGINE", "compiled")
     shipped = School(fish=count)
     scene = shipped.build()
     frames = list(scene.simulation().frames(26, 2.5))

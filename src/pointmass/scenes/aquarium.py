@@ -24,9 +24,9 @@ from pointmass.scenes.fish import DRAG, SUBSTEPS
 from pointmass.solvers import SymplecticEuler
 
 HIGH, DEEP = 0.42, 0.5  # of the tank, relative to its width
-SMALL, TALL, BIG = 0.035, 0.05, 0.15  # lengths of a school's fish, of a grazer, of the pike, likewise
+SMALL, TALL, BIG = 0.05, 0.07, 0.19  # lengths of a school's fish, of a grazer, of the pike, likewise
 TIRED = 0.4  # speed of the pike: it is longer, so that a chase is open
-STONES = ((0.22, 0.05, 0.13), (-0.27, -0.06, 0.10), (-0.12, 0.12, 0.06), (0.36, 0.14, 0.07), (0.05, -0.17, 0.05))
+STONES = ((0.24, 0.02, 0.09), (-0.27, -0.08, 0.08), (-0.14, 0.1, 0.045), (0.38, 0.12, 0.05), (0.05, -0.17, 0.06))
 LEAF = 9  # points of a plant
 LINE = 0.02  # mass of a metre of a plant [kg/m]
 LIFT = 3.0  # acceleration with which a plant rises in the water [m/s^2]
@@ -49,7 +49,7 @@ class Aquarium(ShippedScene):
     grazers: int = knob(5, "fish that go their own way and fear nobody", low=0, high=200)
     pikes: int = knob(1, "that eat small fish", low=0, high=8)
     food: int = knob(30, "flakes that sink; one that is eaten comes again at the surface", low=0, high=1000)
-    plants: int = knob(70, "on the ground", low=0, high=2000)
+    plants: int = knob(110, "on the ground", low=0, high=2000)
     stones: int = knob(3, "in the way", low=0, high=len(STONES))
     width: float = knob(3.0, "of the tank", unit="m", low=0.5, high=20)
     current: float = knob(0.1, "largest speed of the water, which goes to and fro", unit="m/s", low=0, high=1)
@@ -68,10 +68,10 @@ class Aquarium(ShippedScene):
         return self.half * (0.0, 1.0, 0.0)
 
     def obstacles(self) -> list[Collider]:
-        """The glass, and stones that lie half in the ground."""
+        """The glass, and stones that lie on the ground."""
         surface: dict[str, Any] = {"restitution": 0.0, "friction": 0.3, "contact": "discrete"}
         stones = [
-            Sphere((x * self.width, 0.3 * r * self.width, z * self.width), r * self.width, **surface)
+            Sphere((x * self.width, r * self.width, z * self.width), r * self.width, **surface)
             for x, z, r in STONES[: self.stones]
         ]
         return [Box(tuple(self.middle), tuple(2 * self.half), inside=True, **surface), *stones]
@@ -122,7 +122,7 @@ class Aquarium(ShippedScene):
             colliders=self.obstacles(),
             controllers=[brain],
             camera=Camera(
-                position=(0.16 * self.width, 0.3 * self.width, 1.2 * self.width),
+                position=(0.14 * self.width, 0.28 * self.width, 1.0 * self.width),
                 target=(0.0, 0.17 * self.width, 0.0),
                 fov=40.0,
             ),
@@ -130,7 +130,7 @@ class Aquarium(ShippedScene):
                 collider_color="#7f8a94",
                 strand_color="#1d5a34",
                 tip_color="#7fc35a",
-                spring_width=0.004 * self.width,
+                spring_width=0.006 * self.width,
                 groups={name: look for name, look in self._looks().items() if name in bodies},
             ),
         )
