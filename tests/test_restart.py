@@ -98,7 +98,7 @@ def test_a_state_of_something_else_is_refused() -> None:
     with pytest.raises(InvalidInput, match="the state is that of another run, with"):
         pm.Scene(bodies=[pm.chain(4), pm.cloth(2, 2)], dt=1 / 240).simulation().put_state(state)
     assert sim.fits(state)
-    with pytest.raises(InvalidInput, match="the state is that of another run, with .* dt = 0.00416667 s"):
+    with pytest.raises(InvalidInput, match=r"the state is that of another run, with .* dt = 0.00416667 s"):
         pm.Scene(bodies=[pm.chain(4)], dt=1 / 100).simulation().put_state(state)
 
 
