@@ -25,6 +25,9 @@ HEAVY = (
     "starlette",
     "matplotlib",
     "trimesh",
+    "pxr",
+    "vtkmodules",
+    "gsd",
 )
 SOURCES = Path(pm.__file__).parent
 TEXTS = (

@@ -39,6 +39,11 @@ class Deaths:
             self._push(ids[count:], death[count:])
         return np.concatenate(found)
 
+    def known(self) -> tuple[NDArray[np.int64], Array]:
+        """Ids of all who are going to die, and when [s], in no order: another one that is told them knows the same."""
+        ids = [np.zeros(0, np.int64), *(batch[2] for batch in self._batches)]
+        return np.concatenate(ids), np.concatenate([np.zeros(0), *(batch[3] for batch in self._batches)])
+
     def _push(self, ids: NDArray[np.int64], death: Array) -> None:
         if len(ids):
             heappush(self._batches, (float(death[0]), self._made, ids, death))

@@ -495,6 +495,19 @@ class Trails:
         while self._past and self._past[0][0] < t - self.span - 1e-9:
             self._past.popleft()
 
+    def known(self) -> tuple[Array, NDArray[np.int64], NDArray[np.int64], Array]:
+        """Times of the looks, how many were there in each, and their ids and places, one look after the other."""
+        ids = [np.zeros(0, np.int64), *(then for _, then, _ in self._past)]
+        places = [np.zeros((0, 3), np.float32), *(x for *_, x in self._past)]
+        counts = np.array([len(then) for _, then, _ in self._past], np.int64)
+        return np.array([t for t, *_ in self._past]), counts, np.concatenate(ids), np.concatenate(places)
+
+    def know(self, times: Array, counts: NDArray[np.int64], ids: NDArray[np.int64], places: Array) -> None:
+        """Know what was `known`."""
+        ends = np.cumsum(counts)[:-1]
+        looks = zip(times.tolist(), np.split(ids, ends), np.split(places, ends), strict=True) if len(times) else ()
+        self._past = deque(looks)
+
     def drawn(self, look: Look, ids: NDArray[np.int64], colors: Array, extent: float, frame: int) -> list[Drawable]:
         """One curve for each living particle, thinner and fainter towards its past."""
         if len(self._past) < 2 or not len(ids):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import dataclass
 from keyword import iskeyword
@@ -290,6 +290,25 @@ class Particles:
         result._rooms, result._corners = {}, {}
         result._take(lambda values: _some(values, mask))
         return result
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Everything that may change while a run goes on, by name: see `Simulation.state`."""
+        columns = {name: self._arrays[name].copy() for name in ("x", "v", *PLAIN)}
+        columns |= {"id": self.id.copy(), "pinned": self._held.copy(), "version": np.array([self.version])}
+        columns |= {f"attribute.{name}": values.copy() for name, values in self.attributes.items()}
+        groups = list(self.groups.values())
+        return columns | {"groups": np.array(groups, bool).reshape(len(groups), len(self))}
+
+    def put_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Be as in a `state` of the same particles."""
+        for name in ("x", "v", *PLAIN):
+            self._arrays[name][...] = state[name]
+        for name, values in self.attributes.items():
+            values[...] = state[f"attribute.{name}"]
+        self._held[:] = state["pinned"]
+        for mask, stored in zip(self.groups.values(), state["groups"], strict=True):
+            mask[:] = stored
+        self.version = int(state["version"][0])
 
     def select(self, which: Selection) -> NDArray[np.intp]:
         """Rows of a selection, ascending.

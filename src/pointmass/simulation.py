@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,17 +16,17 @@ from pointmass.controllers.controller import Controller
 from pointmass.deaths import Deaths
 from pointmass.emitters.emitter import Birth, Emitter
 from pointmass.engine.engine import Engine, compiled_by_default
-from pointmass.engine.island import Span
+from pointmass.engine.island import CHECKPOINT, Span
 from pointmass.engine.kernels import grow_old
 from pointmass.errors import Diverged, DividedStep, InvalidInput, UnstableStep, number, shown, unknown, whole_number
 from pointmass.frame import Frame
-from pointmass.lineage import Lineage
+from pointmass.lineage import Kin, Lineage
 from pointmass.look import Look, Stage
 from pointmass.motions import Motions, RigidMotion
 from pointmass.particles import Array
 from pointmass.solver_choice import AUTO, chosen
 from pointmass.solvers import as_solver
-from pointmass.solvers.advance import advance
+from pointmass.solvers.advance import Stats, advance
 from pointmass.solvers.base import Memory, Solver
 from pointmass.solvers.control import control_of
 from pointmass.stability import safe_bound
@@ -41,6 +41,7 @@ RUNAWAY = 1e6  # times the speeds seen so far that are explained: somebody this 
 AGREE = 0.1  # of a speed: a step and two half steps that differ by more follow no motion
 MANY_AGED = 1e6  # particle-steps, beyond which ages are worth a kernel
 MANY_MOTIONS = 2000  # particles, beyond which the largest stable dt is not sought, but one that is surely stable
+TRAILS = ("times", "counts", "ids", "places")  # what is known of them
 ON_GRID = 1e-9  # of a step: a frame this near to the grid is on it
 
 
@@ -73,6 +74,7 @@ class Simulation:
     t : time now [s].
     steps : how many steps of dt were made.
     engine : what makes them.
+    on_grid : called before the steps whose number is a multiple of `CHECKPOINT`, when `state` can be asked for.
     solver, solver_reason : what solves, and why it was chosen, if it was.
 
     Raises
@@ -157,6 +159,7 @@ class Simulation:
         self._deaths.add(p.id, self.t0 + (p.lifetime - p.age))
         self._speed_limit = RUNAWAY * self._natural_speed()
         self._looked_at_step = self._told_of_parts = False
+        self.on_grid: Callable[[], None] | None = None
 
     @property
     def t(self) -> float:
@@ -294,6 +297,81 @@ class Simulation:
             result["stretch"] = system.stretch()
         return result
 
+    @property
+    def restless(self) -> str:
+        """Why `state` does not hold all of the run, as a sentence; empty if it does."""
+        for constraint in self.constraints:
+            if constraint.breaks_up:
+                return f"{type(constraint).__name__} changes who is joined to whom"
+        for controller in self.controllers:
+            for name, values in controller.memory.items():
+                if np.asarray(values).dtype.kind not in "biuf":
+                    return f"what {type(controller).__name__} remembers as {name!r} is no array of numbers"
+        return ""
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """All that the rest of the run depends on, as arrays by name; for `on_grid`.
+
+        Another simulation of the same make goes on from there with the same bits (`put_state`), unless this one is
+        `restless`. All chance is keyed, so it has no state.
+        """
+        now = {
+            "steps": np.array([self.steps, self.frames_seen, self._looks[1]]),
+            "times": np.array([self.t0, self.dt, self._looks[0], self._looks[2], self._speed_limit]),
+        }
+        groups: dict[str, Mapping[str, Any]] = {
+            "particles": self.system.particles.state(),
+            "solver": self.engine.reference.memory,
+            "deaths": dict(zip(("ids", "times"), self._deaths.known(), strict=True)),
+            "trails": dict(zip(TRAILS, self._stage.trails.known(), strict=True)),
+        }
+        for k, kin in self._lineage.kin.items():
+            groups[f"kin{k}"] = {"ids": kin.ids, "birth": kin.birth, "death": kin.death}
+        for k, controller in enumerate(self.controllers):
+            groups[f"controller{k}"] = controller.memory
+        for k, force in enumerate(self.system.forces if self.controllers else ()):
+            groups[f"force{k}"] = {name: p.numbers() for name, p in force.parameters.items() if p.may_be_put}
+        return now | {f"{group}.{name}": np.array(a) for group, found in groups.items() for name, a in found.items()}
+
+    def fits(self, state: Mapping[str, NDArray[Any]]) -> bool:
+        """Whether a state can be one of this run, which is still at its start."""
+        groups, mine = _grouped(state), _grouped(self.state())
+        kept = [{name for name in g if name.startswith(("kin", "force"))} for g in (groups, mine)]
+        begun = [float(t) for t in state["times"][:2]] == [self.t0, self.dt]
+        return begun and kept[0] == kept[1] and self.system.fits(groups["particles"])
+
+    def put_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from a `state` of a simulation of the same make; this one has made no steps yet.
+
+        Raises
+        ------
+        InvalidInput
+            It is the state of another simulation. Nothing has changed.
+        """
+        groups = _grouped(state)
+        if not self.fits(state):
+            raise InvalidInput(
+                f"the state is that of another run, with {len(state['particles.id'])} particles and dt ="
+                f" {state['times'][1]:g} s"
+            )
+        times = [float(t) for t in state["times"]]
+        self.steps, self.frames_seen, looks = (int(k) for k in state["steps"])
+        self._looks, self._speed_limit = (times[2], looks, times[3]), times[4]
+        self._looked_at_step = True  # when the run began
+        self.system.put_state(groups["particles"])
+        self.system.t = self.t
+        self.engine.reference.remember(groups.get("solver", {}), Stats())
+        self._deaths = Deaths()
+        self._deaths.add(groups["deaths"]["ids"], groups["deaths"]["times"])
+        self._stage.trails.know(*(groups["trails"][name] for name in TRAILS))
+        for k in self._lineage.kin:
+            self._lineage.kin[k] = Kin(**groups[f"kin{k}"])
+        for k, controller in enumerate(self.controllers):
+            controller.memory = groups.get(f"controller{k}", {})
+        for k, force in enumerate(self.system.forces if self.controllers else ()):
+            for name, values in groups.get(f"force{k}", {}).items():
+                force.parameters[name].put(values if values.ndim else float(values))
+
     # ------------------------------------------------------------------------------------------------ inside
 
     def _grid(self, k: int) -> float:
@@ -311,7 +389,12 @@ class Simulation:
             problem = too_long(self.system, self.solver, self.dt)
             if problem is not None:
                 warnings.warn(problem, UnstableStep, stacklevel=3)
-        most = min(most, self._control())
+        if self.steps % CHECKPOINT == 0:
+            for constraint in self.constraints:
+                constraint.forget()
+            if self.on_grid is not None:
+                self.on_grid()
+        most = min(most, self._control(), CHECKPOINT - self.steps % CHECKPOINT if self.on_grid else most)
         if not self.engine.compiled:
             self._step()
             return
@@ -539,26 +622,27 @@ class Simulation:
 
     def _frames(self, count: int, fps: float) -> Iterator[Frame]:
         for _ in range(count):
-            time = self._next_look(fps)
+            looks, time = self._next_look(fps)
             k = (time - self.t0) / self.dt
             on_grid = abs(k - round(k)) < ON_GRID * max(1.0, k)
             steps = round(k) if on_grid else math.ceil(k)
             self.step(max(0, steps - self.steps - (not on_grid)))
             if self.steps < steps:
                 self._advance(1, look_inside=True)
+            self._looks = looks
             number, self.frames_seen = self.frames_seen, self.frames_seen + 1
             yield self.frame(number, self._grid(steps) if on_grid else time)
 
-    def _next_look(self, fps: float) -> float:
-        """When the next frame is due [s]: now if it is the first one, or if the run has gone past it."""
+    def _next_look(self, fps: float) -> tuple[tuple[float, int, float], float]:
+        """When the next frame is due [s], now if it is the first one, or if the run has gone past it; and `_looks`
+        then."""
         since, looks, rate = self._looks
         if fps != rate and looks:
             since, looks = since + (looks - 1) / rate, 1
         time = since + looks / fps
         if time < (self.t if looks == 0 else self._grid(self.steps - 1)):
             since, looks, time = self.t, 0, self.t
-        self._looks = since, looks + 1, fps
-        return time
+        return (since, looks + 1, fps), time
 
     def _velocities(self, t: float, x: Array, v: Array) -> Array:
         """Velocities of a frame; in a flow they are the field's."""
@@ -660,6 +744,15 @@ class Simulation:
             return None, exact
         finally:
             system.set_state(now)
+
+
+def _grouped(state: Mapping[str, NDArray[Any]]) -> dict[str, dict[str, Any]]:
+    """A state by the parts of the run that it is of."""
+    groups: dict[str, dict[str, Any]] = {}
+    for key, values in state.items():
+        group, _, name = key.partition(".")
+        groups.setdefault(group, {})[name] = values
+    return groups
 
 
 def culprit(system: ParticleSystem) -> tuple[int, str, bool, list[int]]:

@@ -377,6 +377,25 @@ class ParticleSystem:
             force.keep(self.particles, mask)
         self.particles.keep(mask)
 
+    def fits(self, state: Mapping[str, NDArray[Any]]) -> bool:
+        """Whether a state can be one of this system: the same columns and groups, who stays in the same order."""
+        p, ids = self.particles, state["id"]
+        stay = p.id[np.isin(p.id, ids)]
+        alike = state.keys() == p.state().keys() and len(state["groups"]) == len(p.groups)
+        return alike and np.array_equal(stay, ids[: len(stay)])
+
+    def put_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Have the particles of a state that `fits`, see `Particles.state`: some go, and some are new."""
+        p, ids = self.particles, state["id"]
+        gone = ~np.isin(p.id, ids)
+        if gone.any():
+            self.remove(gone)
+        old = len(p)
+        if len(ids) > old:
+            columns = {name: state[name][old:] for name in ("m", "radius", "lifetime", "id")}
+            self.add(state["x"][old:], state["v"][old:], **columns)
+        p.put_state(state)
+
     def part(self, rows: NDArray[np.intp]) -> ParticleSystem:
         """A system of some of the particles under the same laws; this one stays as it is."""
         mask = np.zeros(len(self.particles), bool)

@@ -19,6 +19,7 @@ from pointmass.cache.groups import packed, unpacked
 from pointmass.errors import Diverged, InvalidInput
 from pointmass.frame import Arrows, Camera, Curves, Drawable, Frame, Points, Segments, Triangles
 from pointmass.scenes import SCENES
+from tests.same import assert_same_bits, assert_same_frame
 from tests.small import SMALL
 
 RNG = np.random.default_rng(0)
@@ -46,28 +47,6 @@ def some_frame(k: int, n: int = 20, dtype: Any = np.float64) -> Frame:
         drawables=some_drawables(k, n),
         quantities={"energy": 0.1 * k, "bad": math.nan, "huge": -math.inf},
     )
-
-
-def assert_same_bits(a: Any, b: Any) -> None:
-    if isinstance(a, (np.ndarray, np.generic)):
-        assert type(a) is type(b)
-        assert (a.dtype, a.shape, a.tobytes()) == (b.dtype, b.shape, b.tobytes())
-    elif isinstance(a, float) and math.isnan(a):
-        assert math.isnan(b)
-    else:
-        assert (type(a), a) == (type(b), b)
-
-
-def assert_same_frame(a: Frame, b: Frame) -> None:
-    for name in ("number", "time", "ids", "positions", "velocities"):
-        assert_same_bits(getattr(a, name), getattr(b, name))
-    assert list(a.quantities) == list(b.quantities)
-    for name, value in a.quantities.items():
-        assert_same_bits(value, b.quantities[name])
-    for p, q in zip(a.drawables, b.drawables, strict=True):
-        assert type(p) is type(q)
-        for f in fields(p):
-            assert_same_bits(getattr(p, f.name), getattr(q, f.name))
 
 
 def pendulum_cache(path: Path, frames: int = 4) -> Cache:

@@ -154,6 +154,29 @@ def test_a_second_run_replaces_the_first_with_the_same_bits(folder: Path) -> Non
         assert a.positions.tobytes() == b.positions.tobytes()
 
 
+def test_a_run_goes_on_and_says_why_it_does_not(folder: Path) -> None:
+    run = ["run", "a.toml", "-o", "b.zarr"]
+    assert pointmass(*run, "--frames", "3").exit_code == 0
+    assert "3 frames of 'b.zarr' stay, the run goes on from there" in pointmass(*run, "--resume").stderr
+    done = pointmass(*run)
+    assert "nothing to do: the scene has not changed since 'b.zarr' was made" in done.stderr
+    assert pointmass("why", "b.zarr").stdout == "nothing has changed: 4 frames\n"
+    text = (folder / "a.toml").read_text()
+    (folder / "a.toml").write_text(text.replace("frames = 4", "frames = 4\nseed = 5"))
+    assert pointmass("why", "b.zarr").stdout.splitlines() == [
+        "seed: the default -> 5",
+        "a run keeps 0 frames of 4, and makes the rest again",
+    ]
+    told = json.loads(pointmass("why", "b.zarr", "a.toml", "--set", "seed=6", "--json").stdout)
+    assert (told["changes"], told["kept"]) == ([{"path": "seed", "old": None, "new": 6}], 0)
+    refused = pointmass(*run, "--resume")
+    assert refused.exit_code == 2
+    assert "--resume finds another scene in 'b.zarr' (seed: the default -> 5)" in refused.stderr
+    assert "the scene has changed (seed: the default -> 5): all frames are made again" in pointmass(*run).stderr
+    assert "4 frames in" in pointmass(*run, "--anew").stderr
+    assert len(Cache.open("b.zarr")) == 4
+
+
 def test_a_divergence_keeps_the_frames_before_it(folder: Path) -> None:
     done = pointmass("run", "bursting.toml", "-o", "d.zarr", "--json")
     assert done.exit_code == 3
@@ -223,7 +246,7 @@ def test_render_of_a_divergence_holds_what_came_before(folder: Path) -> None:
 
 def test_export_writes_arrays(folder: Path) -> None:
     pointmass("run", "a.toml")
-    assert pointmass("export", "a.zarr", "-o", "a.npz").exit_code == 0
+    assert pointmass("export", "a.zarr", "a.npz").exit_code == 0
     with np.load("a.npz") as data:
         assert data["positions"].tobytes() == np.stack([f.positions for f in Cache.open("a.zarr")]).tobytes()
 
@@ -231,12 +254,27 @@ def test_export_writes_arrays(folder: Path) -> None:
 def test_export_writes_the_surfaces_of_a_frame(folder: Path) -> None:
     (folder / "sheet.toml").write_text('frames = 3\n[[bodies]]\ntype = "cloth"\nrows = 3\ncols = 3\n')
     pointmass("run", "sheet.toml")
-    assert pointmass("export", "sheet.zarr", "-o", "s.ply", "--frame", "0").exit_code == 0
+    assert pointmass("export", "sheet.zarr", "s.ply", "--frame", "0").exit_code == 0
     assert (folder / "s.ply").read_bytes().startswith(b"ply")
-    assert pointmass("export", "sheet.zarr", "-o", "s_%02d.obj").exit_code == 0
+    assert pointmass("export", "sheet.zarr", "s_%02d.obj").exit_code == 0
     assert sorted(p.name for p in folder.glob("s_*.obj")) == ["s_00.obj", "s_01.obj", "s_02.obj"]
-    late = pointmass("export", "sheet.zarr", "-o", "s.glb", "--frame", "3")
-    assert "--frame 3 is not allowed: the cache has the frames 0 to 2" in late.stderr
+    late = pointmass("export", "sheet.zarr", "s.glb", "--frame", "3")
+    assert "--frame 3 is not allowed: there are the frames 0 to 2" in late.stderr
+
+
+def test_export_takes_scenes_and_chooses_by_the_ending(folder: Path) -> None:
+    for name in ("a.usda", "a.csv", "a_%d.png"):
+        done = pointmass("export", "a.toml", name, "--frames", "2")
+        assert (done.exit_code, done.stdout) == (0, "")
+        assert re.fullmatch(rf"pointmass: 2 frames in [\d.]+ s: {re.escape(name)}\n", done.stderr)
+    names = {"a.toml", "bursting.toml", "a.usda", "a.csv", "a_0.png", "a_1.png"}
+    assert {p.name for p in folder.iterdir()} == names
+    assert "endTimeCode = 1" in (folder / "a.usda").read_text()
+    assert 'def Camera "camera"' in (folder / "a.usda").read_text()
+    burst = pointmass("export", "bursting.toml", "b.npz")
+    assert burst.exit_code == 3
+    with np.load("b.npz") as data:
+        assert f"'b.npz' holds the {len(data['time'])} frames before it" in burst.stderr
 
 
 def test_check_says_what_is_safe(folder: Path) -> None:
@@ -508,11 +546,14 @@ def test_bad_renders(old_files: Path, monkeypatch: pytest.MonkeyPatch, arguments
         (["render", "old.zarr", "-o", "x.mp4", "--dt", "0.1"], "--dt cannot change the cache"),
         (["render", "old.zarr", "-o", "x.mp4", "--set", "a=1"], "--set cannot change the cache"),
         (["render", "old.zarr", "-o", "x.png", "--frame", "2"], "there are 2 frames"),
-        (["export", "old.zarr"], "Missing option '-o'"),
-        (["export", "old.zarr", "-o", "x.csv"], "unknown kind of export '.csv'"),
-        (["export", "old.zarr", "-o", "none/x.npz"], "there is no folder"),
-        (["export", "none.zarr", "-o", "x.npz"], "there is no such folder"),
-        (["export", "folder.mp4", "-o", "x.npz"], "is not a pointmass cache"),
+        (["run", "a.toml", "-o", "x.zarr", "--resume"], "--resume finds no cache 'x.zarr'"),
+        (["run", "a.toml", "--resume", "--anew"], "--resume and --anew cannot both be wanted"),
+        (["why", "none.zarr"], "there is no such folder"),
+        (["export", "old.zarr"], "Missing argument 'OUT'"),
+        (["export", "old.zarr", "x.xyz"], "unknown kind of export '.xyz'"),
+        (["export", "old.zarr", "none/x.npz"], "there is no folder"),
+        (["export", "none.zarr", "x.npz"], "there is no such folder"),
+        (["export", "folder.mp4", "x.npz"], "is not a pointmass cache"),
         (["check", "pendlum"], "unknown scene"),
         (["new", "scene.txt"], "ends in .toml"),
         (["new", "none/scene.toml"], "cannot write 'none/scene.toml'"),
@@ -536,7 +577,7 @@ def test_a_full_disk_is_said_and_nothing_is_left(old_files: Path, monkeypatch: p
 def test_a_damaged_cache_is_refused(old_files: Path) -> None:
     (old_files / "old.zarr/frames/000001/positions/c.0.0").write_bytes(b"junk")
     assert_refused(old_files, ["render", "old.zarr", "-o", "old.mp4"], "frame 1 of the cache 'old.zarr' cannot be read")
-    assert_refused(old_files, ["export", "old.zarr", "-o", "x.npz"], "frame 1 of the cache")
+    assert_refused(old_files, ["export", "old.zarr", "x.npz"], "frame 1 of the cache")
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="nothing is read-only for root")

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from pointmass.cache import Cache
+from tests.same import assert_same_frame
 
 COMMAND = [sys.executable, "-m", "pointmass.cli"]
 TWO_THREADS = {"POINTMASS_THREADS": "2"}
@@ -51,6 +52,20 @@ def test_a_killed_run_leaves_a_whole_cache(tmp_path: Path) -> None:
         kill_a_run(tmp_path / str(attempt), random.Random(attempt))
 
 
+def test_a_killed_run_goes_on_to_the_same_bits(tmp_path: Path) -> None:
+    run = ["run", "pendulum", "--set", "links=2", "--quiet", "-o"]
+    process = start(tmp_path, *run, "k.zarr", "--frames", "100000")
+    wait_for_frames(tmp_path / "k.zarr", 40)  # beyond a checkpoint
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    frames = len(Cache.open(tmp_path / "k.zarr")) + 10
+    for name in ("k.zarr", "w.zarr"):
+        assert start(tmp_path, *run, name, "--frames", str(frames)).wait(timeout=120) == 0
+    killed, whole = (Cache.open(tmp_path / name) for name in ("k.zarr", "w.zarr"))
+    for a, b in zip(killed, whole, strict=True):
+        assert_same_frame(a, b)
+
+
 @pytest.mark.full
 def test_two_hundred_killed_runs_leave_whole_caches(tmp_path: Path) -> None:
     for attempt in range(200):
@@ -68,7 +83,7 @@ def test_a_signal_keeps_the_frames_and_says_so(tmp_path: Path, number: signal.Si
     out, err = process.communicate(timeout=30)
     frames = len(Cache.open(tmp_path / "c.zarr"))
     assert (process.returncode, out) == (code, "")
-    assert err == f"pointmass: {word}: {frames} frames kept in 'c.zarr'\n"
+    assert err == f"pointmass: {word}: {frames} frames kept in 'c.zarr'; the same command goes on from there\n"
 
 
 def test_a_terminated_render_leaves_nothing(tmp_path: Path) -> None:

@@ -69,7 +69,7 @@ def test_what_is_refused_leaves_old_files_alone(tmp_path: Path) -> None:
     (tmp_path / "b.npz").mkdir()
     frames = frames_of([2])
     for name, sentence in (
-        ("a.csv", "unknown kind of export '.csv'"),
+        ("a.xyz", "unknown kind of export '.xyz'"),
         ("none/a.npz", "there is no folder"),
         ("b.npz", "it is a folder"),
     ):
@@ -88,6 +88,12 @@ def test_what_is_refused_leaves_old_files_alone(tmp_path: Path) -> None:
 
 
 def test_every_exporter_says_what_it_does() -> None:
-    for suffix, write in EXPORTERS.items():
+    for suffix, exporter in EXPORTERS.items():
         assert suffix.startswith(".")
-        assert write.__doc__
+        assert exporter.write.__doc__
+
+
+def test_what_is_not_installed_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pointmass.export.exporter.find_spec", lambda name: None)
+    with pytest.raises(InvalidInput, match=r"writing \.usd needs usd-core: pip install 'pointmass\[export\]'"):
+        export(frames_of([2]), tmp_path / "a.usd")

@@ -105,10 +105,10 @@ def test_nothing_is_fetched(tmp_path):
 
 def test_the_command_exports_a_film(tmp_path):
     cache = pm.record(simulation(), tmp_path / "a.zarr", 5)
-    run = CliRunner().invoke(command, [str(cache.path), "-o", str(tmp_path / "a.html"), "-q"])
+    run = CliRunner().invoke(command, [str(cache.path), str(tmp_path / "a.html"), "-q"])
     assert run.exit_code == 0, run.output
     check(read(tmp_path / "a.html")[1], list(cache))
-    run = CliRunner().invoke(command, [str(cache.path), "-o", str(tmp_path / "b.html"), "-q", "--frame", "3"])
+    run = CliRunner().invoke(command, [str(cache.path), str(tmp_path / "b.html"), "-q", "--frame", "3"])
     assert run.exit_code == 0, run.output
     np.testing.assert_allclose(read(tmp_path / "b.html")[1][0][1], cache[3].positions, atol=1e-4)
 

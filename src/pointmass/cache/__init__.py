@@ -1,6 +1,7 @@
 """Runs on disk."""
 
 from pointmass.cache.cache import Cache, check_target
-from pointmass.cache.record import record
+from pointmass.cache.provenance import Making
+from pointmass.cache.record import Plan, plan, record
 
-__all__ = ["Cache", "check_target", "record"]
+__all__ = ["Cache", "Making", "Plan", "check_target", "plan", "record"]

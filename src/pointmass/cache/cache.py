@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -13,8 +14,19 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from pointmass.cache.drawables import read_drawable, write_drawable
-from pointmass.cache.groups import Damaged, packed, read_attributes, read_group, unpacked, write_group
+from pointmass.cache.drawables import folder_of, read_drawable, write_drawable
+from pointmass.cache.groups import (
+    METADATA,
+    Array,
+    Damaged,
+    packed,
+    read_attributes,
+    read_group,
+    unpacked,
+    write_attributes,
+    write_group,
+)
+from pointmass.cache.provenance import Making
 from pointmass.errors import InvalidInput, number
 from pointmass.frame import Camera, Drawable, Frame
 
@@ -23,6 +35,7 @@ if TYPE_CHECKING:
 
 FORMAT = "pointmass cache"
 VERSION = 1
+CHECKPOINTS = "checkpoints"
 LIBRARIES = ("numpy", "scipy", "numba", "zarr")
 
 
@@ -31,9 +44,10 @@ class Cache(Sequence[Frame]):
 
     The root's attributes say what the run was: scene (TOML), scene_hash, seed, dt [s], fps [1/s], solver, dtype,
     camera, versions. `frames/000000` holds `ids`, `positions` [m], `velocities` [m/s] and the attributes number,
-    time [s], quantities and drawables, as pairs of name and version; `drawables/<name>/<version>` holds what there is
-    to see, once. Each group is written beside and renamed into place, and a frame after all that it refers to: at any
-    moment the folder is a valid cache of the frames that are complete.
+    time [s], quantities, made_by (the hash of what it follows from) and drawables, as pairs of name and version;
+    `drawables/<name>/<version>` holds what there is to see, once; `checkpoints/<step>` the whole state at a step. Each
+    group is written beside and renamed into place, and a frame after all that it refers to: at any moment the folder is
+    a valid cache of the frames that are complete.
 
     Attributes
     ----------
@@ -61,6 +75,7 @@ class Cache(Sequence[Frame]):
         fps: float = 60.0,
         camera: Camera | None = None,
         overwrite: bool = False,
+        making: Making | None = None,
         **about: Any,
     ) -> Cache:
         """A new cache without frames.
@@ -72,6 +87,7 @@ class Cache(Sequence[Frame]):
         fps : frames per second of simulated time.
         camera : for pictures of these frames; the scene's by default.
         overwrite : whether a cache that is there already goes.
+        making : what its frames follow from.
         about : what else is worth knowing, as it can stand in JSON: seed, dt, solver.
 
         Raises
@@ -81,19 +97,7 @@ class Cache(Sequence[Frame]):
         """
         path = Path(path)
         check_target(path, overwrite)
-        text = _text(scene)
-        camera = camera or (scene.camera if scene is not None else Camera())
-        attributes = {
-            "format": FORMAT,
-            "version": VERSION,
-            "scene": text,
-            "scene_hash": None if text is None else hashlib.sha256(text.encode()).hexdigest(),
-            "name": path.stem if scene is None else scene.name,
-            "fps": number("fps", fps, above=0, unit="1/s"),
-            **about,
-            "camera": {name: packed(value) for name, value in asdict(camera).items()},
-            "versions": {"pointmass": _own_version(), **{library: version(library) for library in LIBRARIES}},
-        }
+        attributes = attributes_of(path, scene, fps, camera, making, about)
         try:
             _make(path, attributes)
         except OSError as error:
@@ -142,6 +146,7 @@ class Cache(Sequence[Frame]):
             "number": frame.number,
             "time": packed(frame.time),
             "quantities": {name: packed(value) for name, value in frame.quantities.items()},
+            "made_by": self.attributes.get("made_by"),
             "drawables": [[d.name, d.version] for d in frame.drawables],
         }
         arrays = {
@@ -158,6 +163,66 @@ class Cache(Sequence[Frame]):
                 f"cannot write frame {self._count} of the cache {str(self.path)!r}: {error.strerror}"
             ) from None
         self._count += 1
+
+    def keep_state(self, state: Mapping[str, Array]) -> None:
+        """Add a checkpoint: all that the rest of the run depends on, see `Simulation.state`.
+
+        Raises
+        ------
+        InvalidInput
+            It cannot be written.
+        """
+        checkpoints = self.path / CHECKPOINTS
+        steps, frames = (int(k) for k in state["steps"][:2])
+        folder = checkpoints / f"{steps:09d}"
+        if folder.is_dir():
+            return
+        attributes = {"step": steps, "frames": frames, "time": steps * float(state["times"][1])}
+        try:
+            if not checkpoints.is_dir():
+                write_group(checkpoints, {}, {})
+            write_group(folder, attributes | {"made_by": self.attributes.get("made_by")}, state)
+        except OSError as error:
+            raise InvalidInput(f"cannot write a checkpoint of the cache {str(self.path)!r}: {error.strerror}") from None
+
+    def state(self, before: float = math.inf) -> dict[str, Array] | None:
+        """The latest checkpoint that no frame is missing for, at a time before another [s]; None if there is none."""
+        for folder in self._checkpoints():
+            try:
+                attributes = read_attributes(folder)
+                if attributes["frames"] <= len(self) and attributes["time"] < before:
+                    return read_group(folder)[1]
+            except (Damaged, KeyError, TypeError):
+                continue  # an earlier one will do
+        return None
+
+    def cut(self, count: int, attributes: dict[str, Any]) -> None:
+        """Keep so many frames from the start on, with other attributes, and what belongs to them; valid at any moment.
+
+        Raises
+        ------
+        InvalidInput
+            The folder cannot be written.
+        """
+        try:
+            while self._count > count:
+                self._count -= 1
+                _removed(self._folder(self._count))
+            for folder in self._checkpoints():
+                if read_attributes(folder).get("frames", 0) > count:
+                    _removed(folder)
+            seen = {folder_of(self.path, *pair) for k in range(count) for pair in self._drawn(k)}
+            for folder in (self.path / "drawables").glob("*/*"):
+                if folder.is_dir() and folder not in seen:
+                    _removed(folder)
+            self.describe(attributes)
+        except (OSError, Damaged) as error:
+            raise InvalidInput(f"cannot write the cache {str(self.path)!r}: {error}") from None
+
+    def describe(self, attributes: dict[str, Any]) -> None:
+        """Have other attributes."""
+        write_attributes(self.path, attributes)
+        self.attributes = attributes
 
     def __len__(self) -> int:
         return self._count
@@ -227,6 +292,15 @@ class Cache(Sequence[Frame]):
     def _folder(self, k: int) -> Path:
         return self.path / "frames" / f"{k:06d}"
 
+    def _checkpoints(self) -> list[Path]:
+        """Folders of the checkpoints, the latest first."""
+        folder = self.path / CHECKPOINTS
+        return sorted((f for f in folder.iterdir() if f.name.isdecimal()), reverse=True) if folder.is_dir() else []
+
+    def _drawn(self, k: int) -> list[tuple[str, int]]:
+        """Names and versions of the drawables of a frame."""
+        return [(name, version) for name, version in read_attributes(self._folder(k))["drawables"]]
+
     def _drawable(self, name: str, version: int) -> Drawable:
         seen = self._seen.get(name)
         return seen if seen is not None and seen.version == version else read_drawable(self.path, name, version)
@@ -235,6 +309,26 @@ class Cache(Sequence[Frame]):
 def camera_of(attributes: dict[str, Any]) -> Camera:
     """The camera in a cache's attributes."""
     return Camera(**{name: unpacked(value) for name, value in attributes["camera"].items()})
+
+
+def attributes_of(
+    path: Path, scene: Scene | None, fps: float, camera: Camera | None, making: Making | None, about: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The attributes of a cache: see `Cache.create`."""
+    text = _text(scene)
+    camera = camera or (scene.camera if scene is not None else Camera())
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "scene": text,
+        "scene_hash": None if text is None else hashlib.sha256(text.encode()).hexdigest(),
+        "name": path.stem if scene is None else scene.name,
+        "fps": number("fps", fps, above=0, unit="1/s"),
+        **about,
+        **({} if making is None else making.attributes()),
+        "camera": {name: packed(value) for name, value in asdict(camera).items()},
+        "versions": {"pointmass": _own_version(), **{library: version(library) for library in LIBRARIES}},
+    }
 
 
 def check_target(path: Path, overwrite: bool) -> None:
@@ -274,6 +368,15 @@ def _make(path: Path, attributes: dict[str, Any]) -> None:
         new.rename(path)
     finally:
         shutil.rmtree(beside, ignore_errors=True)
+
+
+def _removed(folder: Path) -> None:
+    """Take a group away: at once for all who look, then its files."""
+    gone = folder.with_name(f".{folder.name}.gone")
+    shutil.rmtree(gone, ignore_errors=True)  # of a process that was killed
+    folder.rename(gone)
+    (gone / METADATA).unlink(missing_ok=True)  # first: what a kill leaves behind is no group
+    shutil.rmtree(gone)
 
 
 def _text(scene: Scene | None) -> str | None:

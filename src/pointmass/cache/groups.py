@@ -54,6 +54,19 @@ def write_group(folder: Path, attributes: Attributes, arrays: Mapping[str, Array
         raise
 
 
+def write_attributes(folder: Path, attributes: Attributes) -> None:
+    """Give a group that is there other attributes, at once for all who look.
+
+    Raises
+    ------
+    OSError
+        They cannot be written.
+    """
+    part = folder / f".{METADATA}.part"
+    _write_json(part, {"zarr_format": 3, "node_type": "group", "attributes": attributes})
+    part.replace(folder / METADATA)
+
+
 def read_attributes(folder: Path) -> Attributes:
     """The attributes of a group.
 
@@ -129,7 +142,7 @@ def _metadata_of(dtype: str, ndim: int) -> Attributes:
 def _write_array(folder: Path, array: Array) -> None:
     from numcodecs.zstd import compress
 
-    array = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
+    array = np.asarray(array, array.dtype.newbyteorder("<"), order="C")
     metadata = dict(_metadata_of(array.dtype.newbyteorder("=").name, array.ndim))
     chunk = [max(1, side) for side in array.shape]
     metadata |= {"shape": list(array.shape), "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": chunk}}}

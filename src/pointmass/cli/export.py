@@ -2,48 +2,128 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from pointmass.cli.options import quiet
+from pointmass.cli.main import stopped
+from pointmass.cli.options import RunOptions, as_json, load_scene, quiet, run_options
 from pointmass.cli.progress import progress
-from pointmass.errors import InvalidInput
-from pointmass.frame import Frame
+from pointmass.cli.render import sample
+from pointmass.cli.report import Report, counted
+from pointmass.cli.run import simulated
+from pointmass.errors import Diverged, InvalidInput, unknown
+
+if TYPE_CHECKING:
+    from pointmass.cache import Cache
+    from pointmass.frame import Frame
+
+Tick = Callable[[int], None]
 
 
 @click.command("export")
-@click.argument("cache")
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    help="A file: .npz for all frames as NumPy arrays; .obj, .ply or .glb for the surfaces of the last frame, or of "
-    "each one for a name such as x_%04d.obj; .html for a page that plays them anywhere.",
-)
+@click.argument("source", metavar="CACHE|SCENE")
+@click.argument("output", metavar="OUT")
 @click.option("--frame", type=int, help="The number of one frame, counted from 0.")
+@run_options
+@as_json
 @quiet
-def command(cache: str, output: str, frame: int | None, quiet: bool) -> None:
-    """Write the frames of CACHE for other programs."""
-    from pointmass.cache import Cache
-    from pointmass.export import check_export, export
+def command(source: str, output: str, frame: int | None, as_json: bool, quiet: bool, **values: Any) -> None:
+    """Write the frames of a cache, or of a scene, for other programs.
 
-    page = Path(output).suffix.lower() == ".html"
-    if not page:
-        check_export(output)
-    opened = Cache.open(cache)
-    frames: Sequence[Frame] = opened
-    if frame is not None:
-        if not 0 <= frame < len(frames):
-            raise InvalidInput(f"--frame {frame} is not allowed: the cache has the frames 0 to {len(frames) - 1}")
-        frames = [frames[frame]]
-    with progress("exporting", len(frames), quiet) as tick:
-        if page:
-            from pointmass.viewer.film import to_html
-
-            to_html(
-                frames, output, fps=opened.fps, name=opened.attributes.get("name"), camera=opened.camera, progress=tick
-            )
+    The ending of OUT says how: .usd, .usdc or .usda for Blender, Houdini and Maya; .pvd (and a .vtp for each frame) for
+    ParaView; .gsd for OVITO; .npz and .csv for arrays and tables; .vtp, .ply, .obj or .glb for the last frame, or for
+    each one with a name such as x_%04d.ply; .mp4, .webm, .gif or x_%04d.png for a film, see pointmass render; .html for
+    a page that plays the run anywhere.
+    """
+    options, path = RunOptions(**values), Path(output)
+    report = Report(command="export", path=path)
+    way = Way(path, frame)
+    try:
+        if Path(source).is_dir() or Path(source).suffix == ".zarr":
+            _from_cache(source, options, way, report, quiet)
         else:
-            export(frames, output, tick)
+            scene = load_scene(source, options)
+            way.check_frame(scene.frames)
+            with simulated(scene, path, report, quiet) as cache:
+                report.frames = way.write(cache, quiet)
+    except KeyboardInterrupt as error:
+        report.frames, report.interrupted = 0, True
+        report.show(as_json, quiet)
+        raise stopped(error, f"{output!r} was not written") from None
+    report.show(as_json, quiet)
+    if report.diverged is not None:
+        raise Diverged(f"{report.diverged}; {output!r} holds the {counted(report.frames)} before it")
+
+
+def _from_cache(source: str, options: RunOptions, way: Way, report: Report, quiet: bool) -> None:
+    from pointmass.cache import Cache
+
+    if options.given():
+        raise InvalidInput(f"{options.given()[0]} cannot change the cache {source!r}: export the scene instead")
+    cache = Cache.open(source)
+    way.check_frame(len(cache))
+    report.frames = way.write(cache, quiet)
+
+
+class Way:
+    """The way out that a file's name asks for."""
+
+    def __init__(self, path: Path, frame: int | None) -> None:
+        from pointmass.export import EXPORTERS, check_export
+        from pointmass.render import check_write
+        from pointmass.render.film import WRITERS
+
+        self.path, self.frame, self.suffix = path, frame, path.suffix.lower()
+        self.film = self.suffix in WRITERS
+        if self.film:
+            check_write(path)
+        elif self.suffix in EXPORTERS:
+            check_export(path)
+        elif self.suffix != ".html":
+            raise unknown("kind of export", path.suffix, [*EXPORTERS, *WRITERS, ".html"])
+
+    def check_frame(self, count: int) -> None:
+        """Refuse a frame that is not there.
+
+        Raises
+        ------
+        InvalidInput
+            There are `count` frames, and not this one.
+        """
+        if self.frame is not None and not 0 <= self.frame < count:
+            raise InvalidInput(f"--frame {self.frame} is not allowed: there are the frames 0 to {count - 1}")
+
+    def write(self, cache: Cache, quiet: bool) -> int:
+        """Write the frames of a cache; returns how many were asked for."""
+        self.check_frame(len(cache))  # a run that diverged may have ended before it
+        frames: Sequence[Frame] = cache if self.frame is None else [cache[self.frame]]
+        with progress("exporting", len(frames), quiet) as tick:
+            if self.film:
+                self._film(frames, cache, tick)
+            elif self.suffix == ".html":
+                self._page(frames, cache, tick)
+            else:
+                self._file(frames, cache, tick)
+        return len(frames)
+
+    def _file(self, frames: Sequence[Frame], cache: Cache, tick: Tick) -> None:
+        from pointmass.export import About, export
+        from pointmass.render import fit_camera
+
+        camera = fit_camera(sample(cache), cache.camera) if self.suffix.startswith(".usd") and len(cache) else None
+        export(frames, self.path, tick, About(fps=cache.fps, name=cache.attributes["name"], camera=camera))
+
+    def _page(self, frames: Sequence[Frame], cache: Cache, tick: Tick) -> None:
+        from pointmass.viewer.film import to_html
+
+        name = cache.attributes.get("name")
+        to_html(frames, self.path, fps=cache.fps, name=name, camera=cache.camera, progress=tick)
+
+    def _film(self, frames: Sequence[Frame], cache: Cache, tick: Tick) -> None:
+        from pointmass.render import fit_camera, write
+
+        camera = fit_camera(sample(cache), cache.camera) if len(cache) else None
+        write(iter(frames), self.path, fps=cache.fps, camera=camera, progress=tick)

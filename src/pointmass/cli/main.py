@@ -23,6 +23,7 @@ DONE, BAD_INPUT, DIVERGED = 0, 2, 3
 COMMANDS = {  # module by name of the command, in the order of the help
     "list": "listing",
     "run": "run",
+    "why": "why",
     "render": "render",
     "view": "view",
     "replay": "replay",

@@ -49,6 +49,11 @@ class RunOptions:
     threads: int | None = None
     settings: tuple[str, ...] = ()
 
+    def as_json(self) -> dict[str, Any]:
+        """Those that change a simulation, as they can stand in JSON; `RunOptions(**...)` has them again."""
+        given = {name: getattr(self, name) for name in OPTIONS if getattr(self, name) is not None}
+        return given | ({"settings": list(self.settings)} if self.settings else {})
+
     def given(self) -> list[str]:
         """The options that change a simulation."""
         values = {name: getattr(self, name) for name in OPTIONS}

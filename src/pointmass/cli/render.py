@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +22,7 @@ from pointmass.cli.options import (
 )
 from pointmass.cli.progress import progress
 from pointmass.cli.report import Report, counted
-from pointmass.cli.run import simulate
+from pointmass.cli.run import simulated
 from pointmass.engine.threads import use_threads
 from pointmass.errors import Diverged, InvalidInput, number
 
@@ -130,7 +129,7 @@ class Drawing:
         """Draw the frames of a cache; returns how many."""
         from pointmass.render import Style, fit_camera, write
 
-        camera = fit_camera(_sample(cache), self.camera_with(cache.camera), self.size)
+        camera = fit_camera(sample(cache), self.camera_with(cache.camera), self.size)
         last = len(cache) - 1 if self.frame is None else self.frame
         frames: Iterator[Frame] = iter([cache[last]]) if self.single else iter(cache)
         total = 1 if self.single else len(cache)
@@ -154,28 +153,19 @@ def _from_cache(source: str, options: RunOptions, drawing: Drawing, report: Repo
 
 
 def _from_scene(source: str, options: RunOptions, drawing: Drawing, report: Report) -> None:
-    """Simulate into a cache beside the output, so that the camera can see the whole run, and draw that."""
-    from pointmass.cache import Cache
-
+    """Draw a scene when all of it was simulated, so that the camera can see the whole run."""
     scene = load_scene(source, options)
     drawing.check(scene.frames, scene.fps, scene.camera)
     if drawing.frame is not None:
         scene = scene.changed(frames=drawing.frame + 1)
-    with tempfile.TemporaryDirectory(
-        prefix=".pointmass-", dir=drawing.path.parent, ignore_cleanup_errors=True
-    ) as folder:
-        cache = Path(folder) / "run.zarr"
-        try:
-            simulate(scene, cache, report, drawing.quiet, overwrite=False)
-        except Diverged as error:
-            report.diverged = error
-            if drawing.frame is not None or not report.frames:
-                report.frames = 0
-                raise Diverged(f"{error}; {str(drawing.path)!r} was not written") from error
-        report.frames = drawing.draw(Cache.open(cache))
+    with simulated(scene, drawing.path, report, drawing.quiet) as cache:
+        if report.diverged is not None and drawing.frame is not None:
+            report.frames = 0
+            raise Diverged(f"{report.diverged}; {str(drawing.path)!r} was not written") from report.diverged
+        report.frames = drawing.draw(cache)
 
 
-def _sample(cache: Cache) -> list[Frame]:
+def sample(cache: Cache) -> list[Frame]:
     """Frames spread evenly over the run, the first and the last among them."""
     count = min(SAMPLES, len(cache))
     return [cache[round(k * (len(cache) - 1) / max(1, count - 1))] for k in range(count)]

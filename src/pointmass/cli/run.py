@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -15,26 +18,38 @@ from pointmass.cli.report import Report, counted
 from pointmass.errors import Diverged, InvalidInput
 
 if TYPE_CHECKING:
+    from pointmass.cache import Cache, Plan
     from pointmass.scene import Scene
+
+Mode = Literal["", "resume", "anew"]
 
 
 @click.command("run")
 @click.argument("scene")
 @click.option("-o", "--output", help="The cache, a folder; <scene>.zarr by default.")
+@click.option("--resume", is_flag=True, help="Only go on with a run of the same scene; refuse what has changed.")
+@click.option("--anew", is_flag=True, help="Make all frames again, whatever is there.")
 @run_options
 @as_json
 @quiet
-def command(scene: str, output: str | None, as_json: bool, quiet: bool, **values: Any) -> None:
+def command(
+    scene: str, output: str | None, resume: bool, anew: bool, as_json: bool, quiet: bool, **values: Any
+) -> None:
     """Simulate SCENE into a cache.
 
-    A cache that is there already is replaced. Frames are written one by one: whatever stops the run, the cache holds
-    those before.
+    Frames are written one by one: whatever stops the run, the cache holds those before, and the same command goes on
+    from there with the same bits. Of a cache that is there already, all frames stay that follow from the same scene;
+    where the scene has changed, only those that the change can affect are made again: see pointmass why.
     """
     options = RunOptions(**values)
     path = Path(output) if output is not None else default_output(scene, ".zarr")
     report = Report(command="run", path=path)
+    if resume and anew:
+        raise InvalidInput("--resume and --anew cannot both be wanted: give one of them")
     try:
-        simulate(load_scene(scene, options), path, report, quiet, overwrite=True)
+        loaded = load_scene(scene, options)
+        about = {"source": {"scene": scene, "options": options.as_json()}}
+        simulate(loaded, path, report, quiet, mode="resume" if resume else "anew" if anew else "", about=about)
     except Diverged as error:
         report.diverged = error
         report.show(as_json, quiet)
@@ -47,23 +62,108 @@ def command(scene: str, output: str | None, as_json: bool, quiet: bool, **values
         report.interrupted = True
         report.frames = len(Cache.open(path)) if report.frames else 0  # the last one may not have been counted
         report.show(as_json, quiet)
-        kept = f"{counted(report.frames)} kept in {str(path)!r}" if report.frames else "nothing was written"
+        kept = "nothing was written"
+        if report.frames:
+            kept = f"{counted(report.frames)} kept in {str(path)!r}; the same command goes on from there"
         raise stopped(error, kept) from None
     report.show(as_json, quiet)
 
 
-def simulate(scene: Scene, path: Path, report: Report, quiet: bool, *, overwrite: bool) -> None:
-    """Simulate a scene into a cache, and count its frames in the report."""
-    from pointmass.cache import check_target, record
+def simulate(
+    scene: Scene,
+    path: Path,
+    report: Report,
+    quiet: bool,
+    *,
+    mode: Mode = "",
+    checkpoints: bool = True,
+    about: dict[str, Any] | None = None,
+) -> None:
+    """Simulate a scene into a cache, and count its frames in the report.
 
-    check_target(path, overwrite)
+    Parameters
+    ----------
+    mode : "resume" refuses a cache of another scene, "anew" replaces one, "" keeps of it what still holds.
+    checkpoints : whether it is kept from where a run can go on.
+    about : what else the cache should know.
+
+    Raises
+    ------
+    InvalidInput
+        There is nothing to resume.
+    """
+    from pointmass.cache import check_target, plan, record
+
+    check_target(path, overwrite=True)
     with warnings_said(quiet), laws_said(quiet), progress("simulating", scene.frames, quiet) as tick:
+        sim = scene.simulation()
+        found = plan(path, sim, scene, scene.fps)
+        if mode == "resume" and not found.same:
+            raise InvalidInput(_no_resume(found, path))
+        if mode != "anew" and not quiet:
+            _say(found, path, scene.frames)
+        report.frames = found.kept if mode != "anew" else 0
 
         def count(frames: int) -> None:
             report.frames = frames
             tick(frames)
 
-        record(scene.simulation(), path, scene.frames, scene.fps, scene=scene, overwrite=overwrite, progress=count)
+        record(
+            sim,
+            path,
+            scene.frames,
+            scene.fps,
+            scene=scene,
+            overwrite=True,
+            resume=mode != "anew",
+            checkpoints=checkpoints,
+            progress=count,
+            about=about,
+        )
+
+
+def _say(found: Plan, path: Path, frames: int) -> None:
+    """What stays of a cache that is there, and why."""
+    if found.same and found.kept >= frames:
+        click.echo(f"pointmass: nothing to do: the scene has not changed since {str(path)!r} was made", err=True)
+    elif found.same and found.kept:
+        click.echo(f"pointmass: {counted(found.kept)} of {str(path)!r} stay, the run goes on from there", err=True)
+    elif found.changes:
+        more = f" and {len(found.changes) - 1} more" if len(found.changes) > 1 else ""
+        stay = f"{counted(found.kept)} before it stay" if found.kept else "all frames are made again"
+        click.echo(f"pointmass: the scene has changed ({found.changes[0]}{more}): {stay}", err=True)
+
+
+def _no_resume(found: Plan, path: Path) -> str:
+    if found.cache is None:
+        return f"--resume finds no cache {str(path)!r}: leave it out"
+    if not found.known:
+        return f"--resume cannot know what the frames of {str(path)!r} follow from: use --anew"
+    return f"--resume finds another scene in {str(path)!r} ({found.changes[0]}): leave it out, or see pointmass why"
+
+
+@contextmanager
+def simulated(scene: Scene, output: Path, report: Report, quiet: bool) -> Iterator[Cache]:
+    """A scene in a cache beside the output that is made of it; the cache goes in the end.
+
+    Of a run that diverges it holds the frames before, and the report says so.
+
+    Raises
+    ------
+    Diverged
+        There are none.
+    """
+    from pointmass.cache import Cache
+
+    with tempfile.TemporaryDirectory(prefix=".pointmass-", dir=output.parent, ignore_cleanup_errors=True) as folder:
+        path = Path(folder) / "run.zarr"
+        try:
+            simulate(scene, path, report, quiet, checkpoints=False)
+        except Diverged as error:
+            report.diverged = error
+            if not report.frames:
+                raise Diverged(f"{error}; {str(output)!r} was not written") from error
+        yield Cache.open(path)
 
 
 def _kept(error: Exception, report: Report) -> str:

@@ -68,6 +68,9 @@ class Constraint(Described):
         """
         raise NotImplementedError
 
+    def forget(self) -> None:
+        """Remember nothing of earlier steps: called on a fixed grid of steps, so that a run can go on from there."""
+
     def enforce(self, system: ParticleSystem, step: Step) -> None:
         """Move the particles of `system` from where a step left them to where they may be, in place.
 

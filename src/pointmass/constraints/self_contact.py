@@ -107,6 +107,10 @@ class SelfContact(Constraint):
                 f"{edge.tolist()} passes through the triangle {triangle.tolist()}; move them apart"
             )
 
+    def forget(self) -> None:
+        if self._resolution is not None:
+            self._resolution.forget()
+
     def enforce(self, system: ParticleSystem, step: Step) -> None:
         p = system.particles
         resolution = self._read(p)

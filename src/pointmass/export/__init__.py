@@ -2,21 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from pointmass.beside import beside, check_place
 from pointmass.errors import InvalidInput, unknown
-from pointmass.export.meshes import WRITERS, write_meshes
+from pointmass.export.exporter import About, Exporter
+from pointmass.export.gsd_file import write_gsd
+from pointmass.export.meshes import write_glb, write_obj
 from pointmass.export.npz import write_npz
+from pointmass.export.ply import write_ply
+from pointmass.export.table import write_csv
+from pointmass.export.usd import write_usd
+from pointmass.export.vtp import write_pvd, write_vtp
 from pointmass.frame import Frame
 from pointmass.sequences import is_sequence
 
-Exporter = Callable[[Sequence[Frame], Path, Callable[[int], None] | None], None]
+USD, VTK, GSD = ("pxr", "usd-core"), ("vtkmodules", "vtk"), ("gsd", "gsd")
 
-EXPORTERS: dict[str, Exporter] = {".npz": write_npz, **dict.fromkeys(WRITERS, write_meshes)}
+EXPORTERS: dict[str, Exporter] = {
+    ".npz": Exporter(write=write_npz),
+    ".csv": Exporter(write=write_csv),
+    ".usd": Exporter(write=write_usd, needs=USD),
+    ".usdc": Exporter(write=write_usd, needs=USD),
+    ".usda": Exporter(write=write_usd, needs=USD),
+    ".pvd": Exporter(write=write_pvd, needs=VTK),
+    ".vtp": Exporter(write=write_vtp, needs=VTK, still=True),
+    ".gsd": Exporter(write=write_gsd, needs=GSD),
+    ".ply": Exporter(write=write_ply, still=True),
+    ".obj": Exporter(write=write_obj, still=True),
+    ".glb": Exporter(write=write_glb, still=True),
+}
 
-__all__ = ["EXPORTERS", "check_export", "export", "write_meshes", "write_npz"]
+__all__ = ["EXPORTERS", "About", "Exporter", "check_export", "export"]
 
 
 def check_export(path: str | Path) -> Exporter:
@@ -25,35 +43,74 @@ def check_export(path: str | Path) -> Exporter:
     Raises
     ------
     InvalidInput
-        The suffix is not known, a % in the name is no number, or there is no folder to write into.
+        The suffix is not known, its library is not installed, a % in the name is no number, or there is no folder to
+        write into.
     """
     path = Path(path)
-    if path.suffix.lower() not in EXPORTERS:
+    suffix = path.suffix.lower()
+    if suffix not in EXPORTERS:
         raise unknown("kind of export", path.suffix, EXPORTERS)
-    if path.suffix.lower() in WRITERS:
-        is_sequence(path)
+    EXPORTERS[suffix].check(suffix)
+    is_sequence(path)
     check_place(path)
-    return EXPORTERS[path.suffix.lower()]
+    return EXPORTERS[suffix]
 
 
-def export(frames: Sequence[Frame], path: str | Path, progress: Callable[[int], None] | None = None) -> None:
+def export(
+    frames: Iterable[Frame],
+    path: str | Path,
+    progress: Callable[[int], None] | None = None,
+    about: About | None = None,
+) -> None:
     """Write frames to a file; its suffix says which kind. Files appear when all are complete.
 
     Parameters
     ----------
-    frames : such as a cache.
-    path : `.npz`: all frames as arrays; `.obj`, `.ply` or `.glb`: the surfaces of the last frame, or of each frame for
-        a name such as `x_%04d.obj`.
+    frames : such as a cache, or `sim.frames(240)` while it runs; each is read once and then let go.
+    path : `.npz`, `.csv`, `.usd`, `.pvd`, `.gsd`: all frames; `.vtp`, `.ply`, `.obj`, `.glb`: the last one. A name such
+        as `x_%04d.ply` makes a file of any kind for each frame.
     progress : called with the number of frames written so far.
+    about : what frames do not say: the frame rate and the camera, which `.usd` keeps.
 
     Raises
     ------
     InvalidInput
-        The suffix is not known, there are no frames, a frame has no surface, or the file cannot be written.
+        The suffix is not known, its library is not installed, there are no frames, or the file cannot be written.
+
+    Examples
+    --------
+    >>> export(pm.Cache.open("swing.zarr"), "swing.usd")
     """
     path = Path(path)
-    write = check_export(path)
-    if not len(frames):
-        raise InvalidInput("there are no frames to export")
+    exporter = check_export(path)
+    about = about or About(name=path.stem)
+    if exporter.still and not is_sequence(path):
+        frames = _last(frames)
     with beside(path) as part:
-        write(frames, part, progress)
+        counted = _counted(frames, progress)
+        if is_sequence(path):
+            for frame in counted:
+                exporter.write([frame], part.with_name(part.name % frame.number), about)
+        else:
+            exporter.write(counted, part, about)
+
+
+def _last(frames: Iterable[Frame]) -> list[Frame]:
+    if isinstance(frames, Sequence):
+        return [frames[len(frames) - 1]] if len(frames) else []
+    last: list[Frame] = []
+    for frame in frames:
+        last = [frame]
+    return last
+
+
+def _counted(frames: Iterable[Frame], progress: Callable[[int], None] | None) -> Iterator[Frame]:
+    """The frames; when the next one is asked for, one more was written."""
+    count = 0
+    for frame in frames:
+        yield frame
+        count += 1
+        if progress is not None:
+            progress(count)
+    if not count:
+        raise InvalidInput("there are no frames to export")

@@ -4,94 +4,74 @@ from __future__ import annotations
 
 import tempfile
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.lib.format import open_memmap
+from numpy.lib.format import write_array_header_1_0
 from numpy.typing import NDArray
 
+from pointmass.export.exporter import About
 from pointmass.frame import Frame
 
 Array = NDArray[Any]
 
+PADDING: dict[str, float] = {"ids": -1, "positions": np.nan, "velocities": np.nan}
 
-def write_npz(frames: Sequence[Frame], path: Path, progress: Callable[[int], None] | None = None) -> None:
+
+def write_npz(frames: Iterable[Frame], path: Path, about: About) -> None:
     """All frames, one row each; rows are as long as the largest frame.
 
     `time` [s] and `count` of shape (F,); `ids` (F, n), padded with -1; `positions` [m] and `velocities` [m/s] of shape
     (F, n, 3), padded with NaN; `quantity_<name>` (F,), NaN where a frame has none.
-
-    Parameters
-    ----------
-    frames : read twice, one at a time: whole runs need not fit into memory.
-    path : is written over.
-    progress : called with the number of frames written so far.
     """
-    counts, names = _measure(frames)
     with tempfile.TemporaryDirectory(prefix=f".{path.stem[:32]}-", dir=path.parent) as folder:
-        columns = _columns(Path(folder), frames[0], counts, names)
-        for k, frame in enumerate(frames):
-            _fill(columns, k, frame)
-            if progress is not None:
-                progress(k + 1)
-        for column in columns.values():
-            column.flush()
-        with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
-            for name in columns:
-                archive.write(Path(folder, f"{name}.npy"), f"{name}.npy")
+        ragged = {name: _Ragged(Path(folder, name)) for name in PADDING}
+        times: list[float] = []
+        quantities: list[dict[str, float]] = []
+        for frame in frames:
+            times.append(frame.time)
+            quantities.append(frame.quantities)
+            for name, column in ragged.items():
+                column.add(getattr(frame, name))
+        names = dict.fromkeys(name for each in quantities for name in each)
+        counts = ragged["ids"].counts
+        columns = {"time": np.array(times, np.float64), "count": np.array(counts, np.int64)}
+        columns |= {f"quantity_{name}": np.array([q.get(name, np.nan) for q in quantities]) for name in names}
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED, allowZip64=True) as archive:
+            for name, values in columns.items():
+                with archive.open(f"{name}.npy", "w") as file:
+                    np.save(file, values)
+            for name, column in ragged.items():
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                    column.pad(file, PADDING[name])
 
 
-def _measure(frames: Sequence[Frame]) -> tuple[list[int], list[str]]:
-    """Particles of each frame, and the names of all quantities in the order in which they appear."""
-    counts: list[int] = []
-    names: dict[str, None] = {}
-    for frame in frames:
-        counts.append(len(frame.ids))
-        names |= dict.fromkeys(frame.quantities)
-    return counts, list(names)
+class _Ragged:
+    """Rows of different lengths, kept in a file until the longest is known."""
 
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.counts: list[int] = []
+        self._first = np.zeros(0)
 
-def _columns(folder: Path, first: Frame, counts: list[int], names: list[str]) -> dict[str, Any]:
-    """Arrays on disk, filled with their padding."""
-    rows, most = len(counts), max(counts)
-    kinds: dict[str, tuple[Any, tuple[int, ...], float]] = {
-        "time": (np.float64, (rows,), 0.0),
-        "count": (np.int64, (rows,), 0),
-        "ids": (np.int64, (rows, most), -1),
-        "positions": (first.positions.dtype, (rows, most, 3), np.nan),
-        "velocities": (first.velocities.dtype, (rows, most, 3), np.nan),
-        **{f"quantity_{name}": (np.float64, (rows,), np.nan) for name in names},
-    }
-    result: dict[str, Any] = {}
-    for name, (dtype, shape, padding) in kinds.items():
-        if 0 in shape:  # nothing can be mapped
-            result[name] = _Empty(folder / f"{name}.npy", dtype, shape)
-            continue
-        result[name] = open_memmap(folder / f"{name}.npy", "w+", dtype, shape)
-        result[name][:] = padding
-    return result
+    def add(self, row: Array) -> None:
+        """One more; the first one says what kind of number they are."""
+        if not self.counts:
+            self._first = row
+        self.counts.append(len(row))
+        with self._path.open("ab") as file:
+            file.write(np.ascontiguousarray(row, self._first.dtype).tobytes())
 
-
-class _Empty:
-    """An array on disk without entries."""
-
-    def __init__(self, path: Path, dtype: Any, shape: tuple[int, ...]) -> None:
-        np.save(path, np.zeros(shape, dtype))
-
-    def __setitem__(self, place: Any, value: Any) -> None:
-        """There is no place to set."""
-
-    def flush(self) -> None:
-        """It is on disk."""
-
-
-def _fill(columns: dict[str, Any], k: int, frame: Frame) -> None:
-    n = len(frame.ids)
-    columns["time"][k], columns["count"][k] = frame.time, n
-    columns["ids"][k, :n] = frame.ids
-    columns["positions"][k, :n] = frame.positions
-    columns["velocities"][k, :n] = frame.velocities
-    for name, value in frame.quantities.items():
-        columns[f"quantity_{name}"][k] = value
+    def pad(self, file: Any, padding: float) -> None:
+        """Write them as one array in NumPy's format."""
+        dtype, tail, most = self._first.dtype, self._first.shape[1:], max(self.counts)
+        shape = (len(self.counts), most, *tail)
+        write_array_header_1_0(file, {"descr": dtype.str, "fortran_order": False, "shape": shape})
+        entries = int(np.prod(tail, dtype=int))
+        filler = np.full(most * entries, padding, dtype)
+        with self._path.open("rb") as rows:
+            for count in self.counts:
+                file.write(rows.read(count * entries * dtype.itemsize))
+                file.write(filler[count * entries :].tobytes())

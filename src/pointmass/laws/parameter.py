@@ -185,6 +185,15 @@ class Parameter:
             array = whole
         component.value = read_only(array.copy()) if array.ndim else float(array)
 
+    @property
+    def may_be_put(self) -> bool:
+        """Whether `put` can change it: one number, or a column of them."""
+        return len(self.components) == 1 and not isinstance(self.components[0].value, Traced)
+
+    def numbers(self) -> NDArray[np.float64]:
+        """The number or numbers of one that `may_be_put`, shape () or (rows,)."""
+        return np.asarray(self.components[0].value, np.float64)
+
     def joins(self, other: Parameter) -> bool:
         """Whether a column can hold the numbers of both: functions of t must be the same."""
         return self.vector == other.vector and all(map(_alike, self.components, other.components))

@@ -121,6 +121,10 @@ class Resolution:
             self._move_zones(x0, x1, given, w)
         return not np.array_equal(x1, given)
 
+    def forget(self) -> None:
+        """Look for pairs anew at the next step."""
+        self._found = None
+
     # ------------------------------------------------------------------------------------------------ inside
 
     def _renew(self, x0: Array, x1: Array, first: bool = False) -> bool:

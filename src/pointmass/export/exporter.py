@@ -1,0 +1,58 @@
+"""What an exporter is, and what it is told about a run beside the frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+from pointmass.errors import InvalidInput
+from pointmass.frame import Camera, Frame
+
+
+@dataclass(frozen=True, kw_only=True)
+class About:
+    """What frames do not say.
+
+    Attributes
+    ----------
+    fps : frames per second of simulated time.
+    name : of the run.
+    camera : that looks at it; one without a position or a target is left out.
+    """
+
+    fps: float = 60.0
+    name: str = "run"
+    camera: Camera | None = None
+
+
+Write = Callable[[Iterable[Frame], Path, About], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Exporter:
+    """Writes one kind of file.
+
+    Attributes
+    ----------
+    write : takes frames, each once and one at a time, so that a run of any length fits into memory; the path of a
+        file, in a folder of its own that may hold others beside it in the end; and what there is to know of the run.
+    still : whether a file holds one frame.
+    needs : the module without which it cannot, and what to install for it.
+    """
+
+    write: Write
+    still: bool = False
+    needs: tuple[str, str] | None = None
+
+    def check(self, suffix: str) -> None:
+        """Refuse what lacks its library.
+
+        Raises
+        ------
+        InvalidInput
+            It is not installed.
+        """
+        if self.needs is not None and find_spec(self.needs[0]) is None:
+            raise InvalidInput(f"writing {suffix} needs {self.needs[1]}: pip install 'pointmass[export]'")
