@@ -49,6 +49,11 @@ WORLDS["pebbles"] = lambda **k: [
     pm.DistanceGrid(3.2 * PEBBLE, spacing=0.8, inside=True, **k),
     pm.HeightField(HILLS, (2.5, 2.5), shift=(0, -1.4, 0), **k),
 ]
+WORLDS["pillars"] = lambda **k: [
+    *(pm.Capsule((np.cos(a), -0.9, np.sin(a)), (np.cos(a), 0.6, np.sin(a)), radius=0.2, **k) for a in range(5)),
+    pm.Capsule((0, -0.5, 0), (0.2, 0.5, 0), radius=0.2, shift=("0.3*sin(8*t)", 0, 0), **k),
+    *(pm.Sphere((0.5 * a - 1, -1, 0.1 * a), radius=0.2, **k) for a in range(5)),
+]
 WORLDS["everything"] = lambda **k: [c for name in ("room", "ball", "paddle", "plates") for c in WORLDS[name](**k)]
 FLOATS = st.floats(-1.4, 1.4)
 POINTS = st.tuples(FLOATS, FLOATS, FLOATS)

@@ -26,7 +26,7 @@ HABITS = ("none", "when afraid", "always")
 UNITS = 8.0  # of distance in a body length, in which stimuli are counted
 BITE = 0.25  # distance of the nose from food at which it is eaten, in body lengths
 CATCH = 0.5  # and from the middle of prey, in lengths of the predator
-TRIES = 8  # places that are looked at for one who comes anew
+TRIES = 64  # places that are looked at for one who comes anew
 NEIGHBOURS = 7  # that a fish minds
 COOLING = 20.0  # after a mating, in which nobody is tempted [s]
 
@@ -325,6 +325,7 @@ class FishBrain(Controller):
         memory["meal"] = np.where(eats | catches, t, memory["meal"])
         mated = (memory["intention"] == order.MATE) & (seen.mate_at < 0.8 * length)
         memory["mating"], memory["mated"] = np.where(mated, t, memory["mating"]), memory["mated"] + mated
+        memory["intention"] = np.where(mated | eats | catches, order.WANDER, memory["intention"])  # that is done
         gone = np.unique(seen.meal[eats])
         if len(gone):
             memory["dropped"][gone] += 1
@@ -336,16 +337,18 @@ class FishBrain(Controller):
             self._anew(p, system, int(np.flatnonzero(self._prey)[k]), t, look)
 
     def _anew(self, p: Particles, system: ParticleSystem, k: int, t: float, look: int) -> None:
-        """One that was caught comes again far from all predators, outside of obstacles, as it was."""
+        """One that was caught comes again far from all predators, outside of obstacles, as it was, if there is room."""
         rows, memory = self._fish.rows(p)[k], self.memory
         ids = int(self._fish.ids[k]) + np.arange(TRIES) * 2**40
         way = random.direction(self._seed, "fish", ids, f"anew {look}")
-        places = self.home + 0.9 * self.range * way
+        out = 0.9 * self.range * np.cbrt(random.uniform(self._seed, "fish", ids, f"anew far {look}")[:, :1])
+        places = self.home + out * way
         hunters = self._fish.pose(p)[1][self._predator]
         far = np.sqrt(((places[:, None] - hunters[None]) ** 2).sum(axis=2)).min(axis=1)
         for obstacle in system.colliders:
             far = np.where(obstacle.distance(places, t) < self._fish.length[k], -1.0, far)
-        p.x[rows] += (places[far.argmax()] - p.x[rows].mean(axis=0)).astype(p.dtype)
+        if far.max() >= 0:
+            p.x[rows] += (places[far.argmax()] - p.x[rows].mean(axis=0)).astype(p.dtype)
         p.v[rows] = 0.0
         memory["caught"][k] += 1
 

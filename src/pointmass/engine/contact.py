@@ -31,9 +31,10 @@ common, `clear_lines` gives its statements.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,7 @@ RESPONSES = get_args(Response)
 TRIAL = ("find", "settle", "strike", "evict")  # what a kernel calls before and after each trial
 WIDE = 1.000001  # times a way: more than the roundings of ways
 ROUNDING = {"float64": 1e-13, "float32": 1e-6}  # of the places between which `clear` looks, on top of eps
+FEW = 3  # surfaces of a kind that are printed one by one
 PATH = [f"{p}{end}" for end in "01" for p in ("x", "y", "z", "u", "v", "w")]
 
 
@@ -195,19 +197,22 @@ class ContactText:
 
     def _clear(self) -> list[str]:
         arguments = f"P, {', '.join(PATH)}, t0, h, radius"
-        lines = self.clear_lines("float64", "P")
+        lines = self.clear_lines("float64", "P", loops=True)
         third = f"third = h * {1 / 3!r}"
         body = [*lines.once, *lines.step, third, *lines.begin, *lines.looks]
         body += [*lines.lane, *lines.end, f"return {lines.result}"]
         return ["@njit(**FLAGS)", f"def clear({arguments}):", *indented(body, 1), "", ""]
 
-    def clear_lines(self, dtype: str, table: str) -> ClearLines:
+    def clear_lines(self, dtype: str, table: str, loops: bool = False) -> ClearLines:
         """The statements of `clear`, in a precision.
 
         Parameters
         ----------
         table : name of the array of numbers.
+        loops : whether many surfaces of a kind may be a loop, which no vector of particles can go through.
         """
+        counts = Counter(s.laws for s in self.surfaces if loops and _hull_law(s) is not None)
+        looped: set[Any] = set()
         lines = ClearLines()
         rounding = literal(ROUNDING[dtype], dtype)
         lines.begin.append(f"size = radius + {rounding} * ({' + '.join(f'abs({p})' for p in PATH[:3])})")
@@ -223,10 +228,21 @@ class ContactText:
                 lines.begin.append("safe = True")
                 lines.lane.append(f"far = radius + {rounding} * ({' + '.join(f'abs({p})' for p in PATH[6:9])})")
                 lines.results.append("safe")
-            if surface.laws.apart is not None and not surface.moves:
-                self._clear_by_hull(k, surface.laws.apart, dtype, table, lines)
-            else:
+            apart = _hull_law(surface)
+            if apart is None:
                 self._clear_by_distance(k, dtype, table, lines)
+            elif counts[surface.laws] <= FEW:
+                self._clear_by_hull(k, apart, dtype, table, lines)
+            elif surface.laws not in looped:
+                looped.add(surface.laws)
+                each = ClearLines()
+                self._clear_by_hull("k", apart, dtype, table, each)
+                kind = self._kinds.index(surface.laws)
+                lines.lane += [
+                    "for k in range(SURFACES):",
+                    f"    if {table}[k * ROW + KIND] == {kind} and {table}[k * ROW + MOTION] == 0:",
+                    *indented([*each.once, *each.lane], 2),
+                ]
         return lines
 
     def _clear_of_plane(self, k: int, dtype: str, table: str, lines: ClearLines) -> None:
@@ -263,7 +279,7 @@ class ContactText:
         lines.end += [lower(f"{tag}b"), lower(f"{tag}c")]
         lines.results.append(f"{tag}low + {tag}gap > {tag}room + size")
 
-    def _clear_by_hull(self, k: int, apart: Traced, dtype: str, table: str, lines: ClearLines) -> None:
+    def _clear_by_hull(self, k: int | str, apart: Traced, dtype: str, table: str, lines: ClearLines) -> None:
         """The hull of the control points is apart from the surface."""
         tag = f"q{k}_"
         lines.once += [f"{tag}{a} = R({table}[{k} * ROW + PLACE + {j}])" for j, a in enumerate("xyz")]
@@ -366,6 +382,11 @@ def _flat(surface: Collider) -> bool:
     return not surface.curved and not surface.moves
 
 
+def _hull_law(surface: Collider) -> Traced | None:
+    """The law that tells whether the hull of some points is apart from a curved surface at rest, if there is one."""
+    return None if _flat(surface) or surface.lookup or surface.moves else surface.laws.apart
+
+
 def _legs() -> list[str]:
     """Coordinates of the legs of the control polygon."""
     return [
@@ -392,7 +413,7 @@ def _shape(k: str, law: Traced) -> dict[str, str]:
     return {f"s{j}": f"P[{k} * ROW + SHAPE + {j}]" for j in range(_count(law))}
 
 
-def _numbers(before: list[str], tag: str, k: int, law: Traced, table: str) -> dict[str, str]:
+def _numbers(before: list[str], tag: str, k: int | str, law: Traced, table: str) -> dict[str, str]:
     """Names of locals for the numbers of a shape, read in `before`."""
     used = [j for j in range(_count(law)) if f"s{j}" in law.program.arguments()]
     before += [f"{tag}s{j} = R({table}[{k} * ROW + SHAPE + {j}])" for j in used]

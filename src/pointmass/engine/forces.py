@@ -103,6 +103,7 @@ class Deriv:
         self.binder = Binder(system.particles, Table("C"))
         self.families: list[Elements] = []
         self.pairs: list[Pairs] = []
+        self._searches: dict[str, str] = {}  # for neighbours, by their text
         self.loop = "prange" if parallel else "range"
         self.flags = "parallel=True, **OWNING" if parallel else "**FLAGS"
         self.once = self.flags if parallel else "forceinline=True, **FLAGS"  # each array is seven arguments of a call
@@ -215,7 +216,7 @@ class Deriv:
 
     def _pairs(self, force: PairForce) -> tuple[list[str], list[str]]:
         """Statements that evaluate all pairs, and those that add what they do to a particle."""
-        pairs = Pairs(force, len(self.families) + len(self.pairs), self.binder, self.parallel)
+        pairs = Pairs(force, len(self.families) + len(self.pairs), self.binder, self.parallel, self._searches)
         self.pairs.append(pairs)
         j, switch = pairs.number, self.binder.switch(force)
         evaluate = [f"# {force.name}", f"if {switch} != 0 and e{j} > s{j}:", f"    status |= {pairs.call()}"]

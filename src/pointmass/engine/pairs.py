@@ -46,10 +46,17 @@ class Pairs:
         where not all act on all A: H begins with those that are acted on, A[1] of them, and ends with those that act,
         from A[0] on.
     locals : what a call for one island takes besides, its range s, e in H.
+
+    Parameters
+    ----------
+    searches : functions that search for neighbours and are printed already, text -> name; new ones are added.
     """
 
-    def __init__(self, force: PairForce, number: int, binder: Binder, parallel: bool) -> None:
+    def __init__(
+        self, force: PairForce, number: int, binder: Binder, parallel: bool, searches: dict[str, str] | None = None
+    ) -> None:
         self.force, self.number, self.binder = force, number, binder
+        self._searches: dict[str, str] = {} if searches is None else searches
         self.loop = "prange" if parallel else "range"
         self.flags = "parallel=True, **OWNING" if parallel else "**OWNING"
         self.tile = TILES[parallel]
@@ -278,7 +285,10 @@ class Pairs:
             f"K[{HEAD} + chunk] = moved",
         ]
         given = ["base", "s", "e", reach, *sides, *"HWKLNX", *"A" * self.one_way, "x"]
-        build = f"build{j}({', '.join(given)})"
+        search = self._search(bool(sides))
+        name = self._searches.setdefault("\n".join(search), f"build{j}")
+        printed = [f"@njit({self.flags})", f"def {name}{search[0]}", *search[1:], "", ""] * (name == f"build{j}")
+        build = f"{name}({', '.join(given)})"
         body = [
             f"cut2 = {reach} * {reach}",
             f"slack2 = R({0.5 * SKIN} * {0.5 * SKIN}) * cut2",
@@ -309,10 +319,10 @@ class Pairs:
             *indented(particle, 2),
             "return status",
         ]
-        return "\n".join([*self._build(bool(sides)), "", "", *self._head(), *indented(body, 1), ""])
+        return "\n".join([*printed, *self._head(), *indented(body, 1), ""])
 
-    def _build(self, periodic: bool) -> list[str]:
-        """The function that sorts the particles into cells and lists the neighbours of each.
+    def _search(self, periodic: bool) -> list[str]:
+        """The function that sorts the particles into cells and lists the neighbours of each, from its arguments on.
 
         In a periodic box the images near its faces are sorted too, so that nobody needs to look across a face: a
         record is a particle or an image of one, sorted; `top` is how many there is room for. Stretches of L, each of
@@ -508,7 +518,7 @@ class Pairs:
             "K[0] = 1",
             "return 0",
         ]
-        return [f"@njit({self.flags})", f"def build{self.number}({', '.join(names)}):", *indented(body, 1)]
+        return [f"({', '.join(names)}):", *indented(body, 1)]
 
 
 def _halves(sums: list[int], lanes: int) -> list[str]:

@@ -26,7 +26,7 @@ from pointmass.solvers import SymplecticEuler
 HIGH, DEEP = 0.42, 0.5  # of the tank, relative to its width
 SMALL, TALL, BIG = 0.05, 0.07, 0.19  # lengths of a school's fish, of a grazer, of the pike, likewise
 TIRED = 0.4  # speed of the pike: it is longer, so that a chase is open
-STONES = ((0.24, 0.02, 0.09), (-0.27, -0.08, 0.08), (-0.14, 0.1, 0.045), (0.38, 0.12, 0.05), (0.05, -0.17, 0.06))
+STONES = ((0.24, 0.02, 0.07), (-0.27, -0.08, 0.06), (-0.14, 0.1, 0.04), (0.38, 0.12, 0.05), (0.05, -0.17, 0.06))
 LEAF = 9  # points of a plant
 LINE = 0.02  # mass of a metre of a plant [kg/m]
 LIFT = 3.0  # acceleration with which a plant rises in the water [m/s^2]
@@ -162,14 +162,14 @@ class Aquarium(ShippedScene):
         return self.middle + share * (u - 0.5) * self.half
 
     def _shoal(self, name: str, count: int, length: float, tide: Flow) -> Body:
-        """Fish of a kind side by side, in layers, in their part of the tank."""
-        side = {"school": -0.35, "grazers": 0.1, "pikes": 0.7}[name]
-        n = math.ceil(math.sqrt(count))
+        """Fish of a kind in a block above the stones, in their part of the tank."""
+        side = {"school": -0.35, "grazers": 0.1, "pikes": 0.6}[name]
+        n = math.ceil(count ** (1 / 3))
         k = np.arange(count)
-        row = np.stack([np.zeros(count), (k // n - 0.5 * ((count - 1) // n)), k % n - 0.5 * (n - 1)], axis=1)
-        step = np.minimum([0.0, 1.2 * length, 1.2 * length], 1.4 * self.half / n)
-        stray = self._anywhere(name, count, 0.2) - self.middle
-        places = self.middle + side * self.half * (1.0, 0.0, 0.0) + row * step + stray * (1.0, 0.1, 0.1)
+        row = np.stack([k // n**2, k // n % n, k % n], axis=1) - 0.5 * (n - 1)
+        step = np.minimum(1.3 * length, self.half * (0.7, 0.7, 1.4) / n)
+        stray = 0.15 * (self._anywhere(name, count, 1.0) - self.middle) / self.half * step
+        places = self.middle + self.half * (side, 0.3, 0.0) + row * step + stray
         way = (-1.0 if name == "pikes" else 1.0, 0.0, 0.0)
         return fish(count, places, way, length=length, drag=DRAG * length, current=tide, detail=1 if count > 12 else 2)
 
