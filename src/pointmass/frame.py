@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pointmass.errors import InvalidInput, finite_array, number
+from pointmass.errors import InvalidInput, finite_array, number, whole_number
 
 Floats = NDArray[np.floating[Any]]
 Ints = NDArray[np.integer[Any]]
@@ -188,6 +188,12 @@ class Camera:
     up : direction that is up in the picture.
     fov : vertical angle of view [degrees], in (1, 170).
     azimuth, elevation : direction from which an automatic camera looks [degrees]; azimuth 0 looks along -z.
+    path : where it is at some times, rows of the time [s], position and target [m]: seven numbers; in between it moves
+        smoothly (Fritsch and Carlson's cubics, which do not swing over), before and after it stands.
+    dolly : speed towards the target [m/s], below 0 away from it; it never comes nearer than a twentieth of the way.
+    orbit : speed of its turn about `up` through the target [degrees/s].
+    follow : id of a particle that it keeps in view, from the side from which it would see the target; while there is no
+        such particle, it looks at the target.
     """
 
     position: tuple[float, float, float] | None = None
@@ -196,6 +202,10 @@ class Camera:
     fov: float = 35.0
     azimuth: float = 25.0
     elevation: float = 15.0
+    path: tuple[tuple[float, ...], ...] = ()
+    dolly: float = 0.0
+    orbit: float = 0.0
+    follow: int | None = None
 
     def __post_init__(self) -> None:
         for name in ("position", "target", "up"):
@@ -214,3 +224,13 @@ class Camera:
                     f"camera.position = {self.position} is not allowed: it is {distance:g} m from camera.target, and "
                     f"must be from {NEAREST:g} to {FARTHEST:g} m away"
                 )
+        number("camera.dolly", self.dolly, unit="m/s")
+        number("camera.orbit", self.orbit, unit="degrees/s")
+        if self.follow is not None:
+            whole_number("camera.follow", self.follow, at_least=0)
+        if len(self.path):
+            rows = finite_array("camera.path", self.path, (None, 7))
+            if (rows[1:, 0] <= rows[:-1, 0]).any():
+                raise InvalidInput("camera.path must have times that rise, one for each row")
+            if (abs(rows[:, 1:4] - rows[:, 4:]).max(axis=1) < NEAREST).any():
+                raise InvalidInput("camera.path must have positions that are not at their targets")

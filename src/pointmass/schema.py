@@ -118,6 +118,10 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
         str | list[_exactly(2, float | str)],  # type: ignore[misc]
         "a list of [fraction of the life, colour], or the name of a gradient",
     ),
+    "tuple[tuple[float, ...], ...]": (
+        list[_exactly(7, float)],  # type: ignore[misc]
+        "a list of times, positions and targets, such as [[0, 0, 1, 5, 0, 0, 0], [4, 5, 1, 0, 0, 0, 0]]",
+    ),
     BOX: (_exactly(2, _exactly(3, float)), "two corners, such as [[0, 0, 0], [1, 1, 1]]"),
     "bool": (bool, "true or false"),
     "dict[str, Any]": (dict[str, float | list[float]], "a table of numbers, or of lists of numbers"),

@@ -222,6 +222,16 @@ def test_render_options_change_the_picture(folder: Path) -> None:
     assert len(seen) == 5
 
 
+def test_a_part_of_a_film_is_that_part_also_while_the_camera_moves(folder: Path) -> None:
+    pointmass("run", "a.toml")
+    moves = ["--orbit", "900", "--dolly", "0.5", *SMALL]
+    for name, part in (("x_%04d.png", []), ("y_%04d.png", ["--first", "1", "--last", "2"])):
+        assert pointmass("render", "a.zarr", "-o", name, *part, *moves).exit_code == 0
+    assert sorted(p.name for p in folder.glob("y_*")) == ["y_0001.png", "y_0002.png"]
+    assert (folder / "y_0002.png").read_bytes() == (folder / "x_0002.png").read_bytes()
+    assert (folder / "x_0001.png").read_bytes() != (folder / "x_0000.png").read_bytes()
+
+
 def test_render_of_one_frame_simulates_no_further(folder: Path) -> None:
     done = pointmass("render", "bursting.toml", "-o", "x.png", "--frame", "1", *SMALL)
     assert done.exit_code == 0
@@ -457,6 +467,15 @@ BAD_RENDERS: list[tuple[str, list[str], str]] = [
     ("is folder", ["-o", "folder.mp4"], "it is a folder"),
     ("--frame", ["-o", "x.png", "--frame", "4"], "--frame 4 is not allowed: there are 4 frames, counted from 0"),
     ("--frame negative", ["-o", "x.png", "--frame", "-1"], "--frame -1 is not allowed"),
+    ("--last", ["-o", "x.mp4", "--last", "4"], "--last 4 is not allowed: there are 4 frames"),
+    (
+        "--first after",
+        ["-o", "x.mp4", "--first", "2", "--last", "1"],
+        "--last 1 is not allowed: it is before --first 2",
+    ),
+    ("--first picture", ["-o", "x.png", "--first", "1"], "--first and --last belong to a film"),
+    ("--follow", ["-o", "x.mp4", "--follow", "-1"], "camera.follow = -1 is not allowed"),
+    ("--orbit", ["-o", "x.mp4", "--orbit", "nan"], "orbit = nan is not allowed"),
     ("--frame film", ["-o", "x.mp4", "--frame", "1"], "--frame belongs to a single picture"),
     ("text in a name", ["-o", "x_%s.png"], "one number"),
     ("two numbers in a name", ["-o", "x_%d_%d.png"], "one number"),

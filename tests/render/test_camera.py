@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -6,9 +8,9 @@ from hypothesis.extra.numpy import arrays
 from render_scenes import frame, square
 
 from pointmass.errors import InvalidInput
-from pointmass.frame import Camera, Points, Segments, Triangles
+from pointmass.frame import Camera, Frame, Points, Segments, Triangles
 from pointmass.render import fit_camera
-from pointmass.render.camera import look
+from pointmass.render.camera import look, moved
 
 SIZES = st.sampled_from([(1280, 720), (400, 900), (64, 64)])
 CLOUDS = arrays(np.float64, st.tuples(st.integers(1, 40), st.just(3)), elements=st.floats(-1e3, 1e3, width=32))
@@ -130,3 +132,37 @@ def test_direction_of_an_automatic_camera(azimuth, elevation):
 def test_a_camera_that_sees_nothing_is_refused(values: dict[str, object]) -> None:
     with pytest.raises(InvalidInput, match=f"camera.{next(iter(values))}"):
         Camera(**values)  # type: ignore[arg-type]
+
+
+def test_a_camera_moves_with_the_time_of_a_frame():
+    still = Camera(position=(0, 0, 10), target=(0, 0, 0))
+    later = Frame(number=3, time=2.0, ids=np.array([4, 7]), positions=np.array([[9.0, 0, 0], [1, 2, 3]]), velocities=0)
+    assert moved(still, later) is still
+    np.testing.assert_allclose(moved(replace(still, orbit=45.0), later).position, (10, 0, 0), atol=1e-12)
+    assert moved(replace(still, dolly=1.5), later).position == pytest.approx((0, 0, 7))
+    assert moved(replace(still, dolly=100.0), later).position == pytest.approx((0, 0, 0.5))  # and no nearer
+    beside = moved(replace(still, follow=7, orbit=90.0), later)
+    np.testing.assert_allclose([beside.position, beside.target], [(1, 2, -7), (1, 2, 3)], atol=1e-12)
+    assert moved(replace(still, follow=5), later).target == (0, 0, 0)  # nobody of that name is there
+
+
+def test_a_path_goes_through_its_rows_and_not_beyond():
+    path = ((0, 0, 0, 10, 0, 0, 0), (1, 4, 0, 10, 0, 0, 0), (2, 4, 0, 5, 1, 0, 0))
+    camera = fit_camera([frame([[0, 0, 0]])], Camera(path=path))
+    places = []
+    for time in np.linspace(-1, 3, 41):
+        now = moved(camera, Frame(number=0, time=time, ids=np.zeros(0, int), positions=np.zeros((0, 3)), velocities=0))
+        places.append([*now.position, *now.target])
+    places = np.array(places)
+    np.testing.assert_allclose(places[[0, 10, 20, 30, 40]], np.array(path)[[0, 0, 1, 2, 2], 1:], atol=1e-12)
+    assert (np.diff(places[:, 0]) >= -1e-12).all()
+    assert places[:, 0].max() <= 4 + 1e-12
+    for wrong, said in (
+        ({"path": ((0, 0, 0, 1, 0, 0),)}, r"camera.path must have shape \(n, 7\)|camera.path"),
+        ({"path": (path[1], path[0])}, "times that rise"),
+        ({"path": ((0, 1, 1, 1, 1, 1, 1),)}, "not at their targets"),
+        ({"follow": -1}, "camera.follow = -1"),
+        ({"orbit": np.nan}, "camera.orbit"),
+    ):
+        with pytest.raises(InvalidInput, match=said):
+            Camera(**wrong)

@@ -18,13 +18,7 @@ if TYPE_CHECKING:
     from pointmass.scene import Scene
     from pointmass.simulation import Simulation
 
-NO_MATTER = (
-    "name",
-    "summary",
-    "frames",
-    "camera",
-    "fps",
-)  # keys of a scene that change no frame; fps is compared apart
+NO_MATTER = ("name", "summary", "frames", "camera", "fps")  # keys that change no frame; fps is compared apart
 FOLLOWS = ("of", "on", "name", "at", "above")  # keys of an emitter by which it is tied to others
 MIRRORED = {ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from pointmass.cache import Cache
     from pointmass.frame import Camera, Frame
 
+UNITS = {"azimuth": "degrees", "elevation": "degrees", "fov": "degrees", "orbit": "degrees/s", "dolly": "m/s"}
 SAMPLES = 48  # frames that an automatic camera looks at
 
 
@@ -44,6 +45,11 @@ SAMPLES = 48  # frames that an automatic camera looks at
 @click.option("--azimuth", type=float, help="Direction from which the camera looks [degrees].")
 @click.option("--elevation", type=float, help="Likewise, above the horizon [degrees].")
 @click.option("--fov", type=float, help="Vertical angle of view [degrees].")
+@click.option("--orbit", type=float, help="Turn of the camera about what it looks at [degrees/s].")
+@click.option("--dolly", type=float, help="Speed of the camera towards it [m/s].")
+@click.option("--follow", type=int, help="Id of a particle that the camera goes with.")
+@click.option("--first", type=int, help="Number of the film's first frame, counted from 0.")
+@click.option("--last", type=int, help="Number of its last frame.")
 @run_options
 @as_json
 @quiet
@@ -56,6 +62,11 @@ def command(
     azimuth: float | None,
     elevation: float | None,
     fov: float | None,
+    orbit: float | None,
+    dolly: float | None,
+    follow: int | None,
+    first: int | None,
+    last: int | None,
     as_json: bool,
     quiet: bool,
     **values: Any,
@@ -64,8 +75,8 @@ def command(
     options = RunOptions(**values)
     path = Path(output) if output is not None else default_output(source, ".mp4")
     report = Report(command="render", path=path)
-    view = {"azimuth": azimuth, "elevation": elevation, "fov": fov}
-    drawing = Drawing(path, parse_size(size), frame, caption, view, quiet)
+    view = {"azimuth": azimuth, "elevation": elevation, "fov": fov, "orbit": orbit, "dolly": dolly}
+    drawing = Drawing(path, parse_size(size), frame, (first, last), caption, view, follow, quiet)
     if Path(source).is_file() and path.exists() and path.samefile(source):
         raise InvalidInput(f"cannot write {str(path)!r}: it is the scene itself")
     try:
@@ -90,14 +101,17 @@ class Drawing:
         path: Path,
         size: tuple[int, int],
         frame: int | None,
+        part: tuple[int | None, int | None],
         caption: bool,
         view: dict[str, float | None],
+        follow: int | None,
         quiet: bool,
     ) -> None:
         from pointmass.render.film import is_single
 
         self.path, self.size, self.frame, self.caption, self.quiet = path, size, frame, caption, quiet
-        self.view = {name: number(name, value, unit="degrees") for name, value in view.items() if value is not None}
+        self.part, self.follow = part, follow
+        self.view = {name: number(name, v, unit=UNITS[name]) for name, v in view.items() if v is not None}
         self.single = is_single(path)
 
     def check(self, count: int, fps: float, camera: Camera | None) -> None:
@@ -114,15 +128,28 @@ class Drawing:
         self.camera_with(camera)
         if self.frame is not None and not self.single:
             raise InvalidInput(f"--frame belongs to a single picture such as x.png, not to {self.path.name!r}")
-        if self.frame is not None and not 0 <= self.frame < count:
-            raise InvalidInput(f"--frame {self.frame} is not allowed: there are {counted(count)}, counted from 0")
+        for name, value in (("frame", self.frame), ("first", self.part[0]), ("last", self.part[1])):
+            if value is not None and not 0 <= value < count:
+                raise InvalidInput(f"--{name} {value} is not allowed: there are {counted(count)}, counted from 0")
+        if self.single and self.part != (None, None):
+            raise InvalidInput(
+                f"--first and --last belong to a film, not to {self.path.name!r}: --frame is for a picture"
+            )
+        if not self._numbers(count):
+            raise InvalidInput(f"--last {self.part[1]} is not allowed: it is before --first {self.part[0]}")
+
+    def _numbers(self, count: int) -> range:
+        """Numbers of the frames of a film."""
+        first, last = self.part
+        return range(first or 0, count if last is None else last + 1)
 
     def camera_with(self, camera: Camera | None) -> Camera:
         """A camera as the options say; a direction replaces a position."""
         from pointmass.frame import Camera
 
         turned = {"position": None} if {"azimuth", "elevation"} & set(self.view) else {}
-        changes: dict[str, Any] = {**turned, **self.view}
+        followed = {} if self.follow is None else {"follow": self.follow}
+        changes: dict[str, Any] = {**turned, **self.view, **followed}
         return replace(camera or Camera(), **changes)
 
     def draw(self, cache: Cache) -> int:
@@ -130,9 +157,11 @@ class Drawing:
         from pointmass.render import Style, fit_camera, write
 
         camera = fit_camera(sample(cache), self.camera_with(cache.camera), self.size)
-        last = len(cache) - 1 if self.frame is None else self.frame
-        frames: Iterator[Frame] = iter([cache[last]]) if self.single else iter(cache)
-        total = 1 if self.single else len(cache)
+        numbers: Sequence[int] = self._numbers(len(cache))
+        if self.single:
+            numbers = [len(cache) - 1 if self.frame is None else self.frame]
+        frames: Iterator[Frame] = (cache[k] for k in numbers)
+        total = len(numbers)
         style = Style(caption=self.caption)
         with compiling_said(self.quiet), progress("rendering", total, self.quiet) as tick:
             write(frames, self.path, fps=cache.fps, camera=camera, size=self.size, style=style, progress=tick)
@@ -158,6 +187,8 @@ def _from_scene(source: str, options: RunOptions, drawing: Drawing, report: Repo
     drawing.check(scene.frames, scene.fps, scene.camera)
     if drawing.frame is not None:
         scene = scene.changed(frames=drawing.frame + 1)
+    elif drawing.part[1] is not None:
+        scene = scene.changed(frames=drawing.part[1] + 1)
     with simulated(scene, drawing.path, report, drawing.quiet) as cache:
         if report.diverged is not None and drawing.frame is not None:
             report.frames = 0

@@ -20,6 +20,7 @@ PERCENTILES = (1.0, 99.0)
 FARTHEST = 1e12  # [m]
 _STEPS = np.array([d for d in np.ndindex(5, 5, 5) if max(abs(k - 2) for k in d) == 2], np.float64) - 2.0
 DIRECTIONS = _STEPS / np.linalg.norm(_STEPS, axis=1)[:, None]  # 98 of them, evenly spread
+CLOSEST = 0.05  # part of its distance to which a camera comes near
 NEAR = 0.002  # nearest visible depth, as a fraction of the distance from the eye to the target
 
 
@@ -74,6 +75,40 @@ def look(camera: Camera, size: tuple[int, int]) -> View:
     return View(eye, _axes(forward / distance, camera.up), focal, width, height, NEAR * distance)
 
 
+def moved(camera: Camera, frame: Frame) -> Camera:
+    """A camera whose position and target are known, at the time of a frame: see `Camera.path` and what follows there.
+
+    It depends on nothing but the frame, so that films can be made in parts.
+    """
+    if not (len(camera.path) or camera.dolly or camera.orbit or camera.follow is not None):
+        return camera
+    eye, target = np.array(camera.position, np.float64), np.array(camera.target, np.float64)
+    if len(camera.path):
+        eye, target = _on_path(np.asarray(camera.path, np.float64), frame.time)
+    offset = eye - target
+    distance = float(np.linalg.norm(offset))
+    offset *= max(distance - camera.dolly * frame.time, CLOSEST * distance) / distance
+    angle = math.radians(camera.orbit * frame.time)
+    up = direction(camera.up)
+    along = up * (offset @ up)
+    aside = offset - along
+    offset = along + math.cos(angle) * aside + math.sin(angle) * np.cross(up, aside)
+    rows = np.flatnonzero(frame.ids == (-1 if camera.follow is None else camera.follow))
+    if len(rows) and np.isfinite(frame.positions[rows[0]]).all():
+        target = frame.positions[rows[0]].astype(np.float64)
+    return replace(camera, position=_triple(target + offset), target=_triple(target))
+
+
+def _on_path(rows: Vector, time: float) -> tuple[Vector, Vector]:
+    """Position and target between the rows of a path."""
+    if len(rows) == 1:
+        return rows[0, 1:4], rows[0, 4:]
+    from scipy.interpolate import PchipInterpolator  # on first use: it takes a while
+
+    place = PchipInterpolator(rows[:, 0], rows[:, 1:])(np.clip(time, rows[0, 0], rows[-1, 0]))
+    return place[:3], place[3:]
+
+
 def fit_camera(frames: Iterable[Frame], camera: Camera | None = None, size: tuple[int, int] = (1280, 720)) -> Camera:
     """The camera with its position and target filled in, so that the whole scene is in the picture.
 
@@ -92,6 +127,9 @@ def fit_camera(frames: Iterable[Frame], camera: Camera | None = None, size: tupl
     Camera : with `position` and `target`.
     """
     camera = camera or Camera()
+    if len(camera.path):
+        place = np.asarray(camera.path[0], np.float64)
+        return replace(camera, position=_triple(place[1:4]), target=_triple(place[4:]))
     if camera.position is not None and camera.target is not None:
         return camera
     spots = _interesting(frames)

@@ -16,7 +16,7 @@ from pointmass.frame import Arrows, Camera, Curves, Drawable, Frame, Points, Seg
 from pointmass.render.balls import EMPTY as NO_BALLS
 from pointmass.render.balls import balls
 from pointmass.render.bands import each
-from pointmass.render.camera import View, fit_camera, look
+from pointmass.render.camera import View, fit_camera, look, moved
 from pointmass.render.capsules import EMPTY as NO_CAPSULES
 from pointmass.render.capsules import arrows, curves, segments, streaks
 from pointmass.render.haze import light as light_sprites
@@ -65,7 +65,7 @@ def image(
     """
     size = checked_size(size)
     style = style or Style()
-    camera = fit_camera([frame], camera, size)
+    camera = moved(fit_camera([frame], camera, size), frame)
     light, spill = _light(frame, camera, look(camera, size), style)
     picture = _develop(light, spill, style)
     if style.caption:
