@@ -26,6 +26,7 @@ from pointmass.emitters import Normal, Spread
 from pointmass.emitters.emitter import Emitter
 from pointmass.errors import InvalidInput, number, unknown, whole_number
 from pointmass.forces import FORCES, load_grid
+from pointmass.forces.air import VELOCITIES
 from pointmass.frame import Camera
 from pointmass.laws.force import Force
 from pointmass.laws.grid import Grid
@@ -413,13 +414,14 @@ def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, fol
     values = dict(table)
     kind = values.pop("type")
     try:
-        if isinstance(values.get("velocity"), Mapping):
-            values["velocity"] = _made(FORCES, values["velocity"], f"{where}.velocity", folder)
-        if isinstance(values.get("velocity"), list):
-            values["velocity"] = [
-                _made(FORCES, part, f"{where}.velocity.{k}", folder) if isinstance(part, Mapping) else part
-                for k, part in enumerate(values["velocity"])
-            ]
+        for name in VELOCITIES:
+            if isinstance(values.get(name), Mapping):
+                values[name] = _made(FORCES, values[name], f"{where}.{name}", folder)
+            if isinstance(values.get(name), list):
+                values[name] = [
+                    _made(FORCES, part, f"{where}.{name}.{k}", folder) if isinstance(part, Mapping) else part
+                    for k, part in enumerate(values[name])
+                ]
         if "around" in values:
             solids = enumerate(values["around"])
             values["around"] = [_made(COLLIDERS, solid, f"{where}.around.{k}", folder) for k, solid in solids]

@@ -23,6 +23,7 @@ from pointmass.collisions import COLLIDERS
 from pointmass.description import parameters_of
 from pointmass.errors import InvalidInput, shown, unknown
 from pointmass.forces import FORCES
+from pointmass.forces.air import VELOCITIES
 from pointmass.frame import Camera
 from pointmass.laws.unary import VelocityField
 from pointmass.look import OF_PARTICLES, Look
@@ -89,6 +90,7 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
     "Chance": (CHANCE, f"a number, or {SPREAD}"),
     "Families": (str | list[str], "the name of a family of springs, such as 'stretch', or a list of names"),
     "Grid | str": (str | GridTable, "the path of a file, or a table with its path"),
+    "CurveSource": (list[list[list[float]]], "a list of strands, each a list of points"),
     "DistanceSource": (str | list[list[list[float]]], "the path of a file, or rows of rows of distances"),
     "HeightSource": (str | list[list[float]], "the path of a file, or a list of rows of heights"),
     "Rate": (float | str, "a number, or a formula of t in quotes"),
@@ -360,13 +362,13 @@ def _check_entry(where: str, what: str, table: Any, registry: Mapping[str, Any])
         raise InvalidInput(f"{where} needs a type: one of {', '.join(registry)}")
     if not isinstance(kind, str) or kind not in registry:
         raise unknown(f"type in {where}:", kind, registry)
-    nested = table.get("velocity")
-    if what == "forces" and isinstance(nested, Mapping):
-        _check_entry(f"{where}.velocity", "forces", nested, _flow_kinds())
-    if what == "forces" and isinstance(nested, list):
-        for k, part in enumerate(nested):
+    for name in VELOCITIES if what in ("forces", "bodies") else ():
+        nested = table.get(name)
+        if isinstance(nested, Mapping):
+            _check_entry(f"{where}.{name}", "forces", nested, _flow_kinds())
+        for k, part in enumerate(nested if isinstance(nested, list) else ()):
             if isinstance(part, Mapping):
-                _check_entry(f"{where}.velocity.{k}", "forces", part, _flow_kinds())
+                _check_entry(f"{where}.{name}.{k}", "forces", part, _flow_kinds())
     if isinstance(around := table.get("around"), list):
         for k, solid in enumerate(around):
             _check_entry(f"{where}.around.{k}", "colliders", solid, COLLIDERS)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pointmass.bodies.body import Body, body
 from pointmass.errors import InvalidInput, finite_array, number, whole_number
+from pointmass.forces.air import Velocity
 from pointmass.forces.fins import Fins
 from pointmass.forces.muscles import Muscles
 from pointmass.forces.springs import Springs
@@ -155,7 +156,7 @@ def fish(
     drag: float = 400.0,
     fins: float = 0.02,
     upright: float = 0.02,
-    current: Any = (0.0, 0.0, 0.0),
+    current: Velocity = (0.0, 0.0, 0.0),
     detail: int = 1,
 ) -> Body:
     """Artificial fish of 23 particles and 91 springs each, of which 12 are muscles, in water that they push away.
@@ -178,7 +179,8 @@ def fish(
     drag : of the skin in the water, force for each area and speed [N s/m^3].
     fins : area of the pectoral fins, in squares of the length.
     upright : force up on the upper and down on the lower corners of the section with the fins, in weights of the fish.
-    current : velocity of the water [m/s], three numbers or formulas.
+    current : velocity of the water [m/s]: three numbers or formulas, a velocity field such as `Gust(...)`, or a list of
+        both.
     detail : how often the triangles of the skin are divided, 0 to 3.
 
     Raises

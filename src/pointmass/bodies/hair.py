@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pointmass import random
 from pointmass.bodies.body import Body, body
@@ -20,6 +20,7 @@ from pointmass.meshes import TriangleSource, as_mesh
 from pointmass.particles import Particles
 from pointmass.tracing import functions as fn
 
+CurveSource = ArrayLike  # strands of points, shape (strands, points, 3) [m]
 Array = NDArray[np.float64]
 
 STYLES = {"straight": (0.0, 0.0), "wavy": (0.006, 10.0), "curly": (0.007, 16.0)}  # radius [m], turns per metre
@@ -48,7 +49,7 @@ def hair(
     cap: float = 90.0,
     crown: Any = (0.0, 1.0, 0.0),
     mesh: TriangleSource | None = None,
-    curves: Any = None,
+    curves: CurveSource | None = None,
     comb: Any = (0.0, 0.0, 0.0),
     lean: float = 0.0,
     thickness: float = 8e-5,

@@ -197,17 +197,19 @@ class FishBrain(Controller):
         self, system: ParticleSystem, t: float, nose: Array, middle: Array, heading: Array, axis: Array, food: Array
     ) -> Seen:
         """Everything that each fish perceives."""
-        fish, obstacles = self._fish, system.colliders
+        fish = self._fish
         n, length = len(fish), fish.length
         seen = Seen(nose=nose, middle=middle, heading=heading, length=length, home=self.home, range=self.range)
         seen.neighbours, seen.apart = self._mates(middle, axis)
+        surfaces = [surface for obstacle in system.colliders for surface in obstacle.surfaces]
+        away = np.zeros((n, 3))
         for ahead in (0.0, 0.5, 1.0, 2.0):
             point = nose + (ahead * length)[:, None] * heading
-            for obstacle in obstacles:
-                d = obstacle.distance(point, t) + 0.5 * ahead * length  # what is farther ahead matters less
-                near = d < seen.wall
-                seen.wall = np.where(near, d, seen.wall)
-                seen.normal = np.where(near[:, None], obstacle.normal(point, t), seen.normal)
+            for surface in surfaces:
+                d = surface.distance(point, t) + 0.5 * ahead * length  # what is farther ahead matters less
+                seen.wall = np.minimum(seen.wall, d)
+                away += np.maximum(1.0 - d / length, 0.0)[:, None] * surface.normal(point, t)
+        seen.normal = directed(away)
         seen.predators = middle[self._predator]
         seen.threats, seen.danger = self._targets(system, t, seen, axis, self._prey, seen.predators, 4)
         eaters = ~self._predator

@@ -26,7 +26,7 @@ class Seen:
     nose, middle, heading : shape (n, 3) [m].
     length : shape (n,) [m].
     home, range : middle and radius of the water in which they stay [m].
-    wall, normal : distance of the nearest obstacle on the way [m] and its normal.
+    wall, normal : distance of the nearest obstacle on the way [m], and the direction away from all that are near.
     neighbours, apart : nearest fish in view and their distances, shape (n, k); inf where there are fewer.
     kin : which of these are of one's own body.
     threats, danger : numbers and distances of predators that are seen.

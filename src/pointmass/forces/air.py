@@ -16,6 +16,7 @@ from pointmass.particles import Particles
 from pointmass.tracing import functions as fn
 from pointmass.tracing.trace import Traced, trace
 
+VELOCITIES = ("velocity", "current")  # what forces and bodies call theirs
 Velocity = Vector | VelocityField | Sequence[Vector | VelocityField]
 
 

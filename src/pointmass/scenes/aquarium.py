@@ -78,8 +78,9 @@ class Aquarium(ShippedScene):
 
     def build(self) -> Scene:
         """Fish by kinds in the middle of the tank, plants where there is no stone, food below the surface."""
-        rate, high = 2 * math.pi / self.swell, float(self.half[1])
-        tide = Flow((f"{self.current!r}*sin({rate!r}*t + 2*x)*(0.4 + 0.6*y/{high!r})", 0, 0))
+        rate, (far, high, _) = 2 * math.pi / self.swell, self.half.tolist()
+        to_and_fro = f"{self.current!r}*sin({rate!r}*t + 2*x)*(0.4 + 0.6*y/{high!r})"
+        tide = Flow((f"{to_and_fro}*max(1 - (x/{far!r})**2, 0)", 0, 0))  # none at the glass
         kinds = {
             "school": (self.school, SMALL, "prey", "always", 1.0),
             "grazers": (self.grazers, TALL, "pacifist", "none", 0.7),
@@ -104,7 +105,7 @@ class Aquarium(ShippedScene):
             schools=habits,
             sight=0.5 * self.width,
             smell=0.3 * self.width,
-            home=(*self.middle, 0.6 * self.width),
+            home=(*self.middle, 0.4 * self.width),
             feeding=(*top, *(1.6 * self.half * (1.0, 0.1, 1.0))),
             frequency=self.frequency,
             vigour=vigour,

@@ -31,7 +31,7 @@ class FishScene(ShippedScene):
     presets: ClassVar[dict[str, dict[str, Any]]] = {
         "muscles": {"skin": False},
         "hurry": {"frequency": 3.5, "amplitude": 0.25},
-        "climb": {"goal_y": 0.45, "goal_z": 0.2},
+        "climb": {"goal_y": 0.35, "goal_z": 0.2},
         "small": {"length": 0.08, "goal_x": 0.3, "goal_y": 0.02, "goal_z": 0.2},
     }
 
