@@ -619,7 +619,7 @@ def test_an_interrupt_ends_with_130(folder: Path, monkeypatch: pytest.MonkeyPatc
     done = pointmass(*command)
     assert done.exit_code == 130
     if command[0] == "run":
-        assert done.stderr == "pointmass: interrupted: 2 frames kept in 'i.zarr'\n"
+        assert done.stderr == "pointmass: interrupted: 2 frames kept in 'i.zarr'; the same command goes on from there\n"
         assert len(Cache.open("i.zarr")) == 2
     else:
         assert done.stderr == "pointmass: interrupted: 'i.mp4' was not written\n"

@@ -100,11 +100,17 @@ def simulate(
         found = plan(path, sim, scene, scene.fps)
         if mode == "resume" and not found.same:
             raise InvalidInput(_no_resume(found, path))
-        if mode != "anew" and not quiet:
-            _say(found, path, scene.frames)
         report.frames = found.kept if mode != "anew" else 0
+        untold = mode != "anew" and not quiet
+        if untold and found.same:
+            _say(found, path, scene.frames)
+            untold = False
 
         def count(frames: int) -> None:
+            nonlocal untold
+            if untold:  # of another scene it is not known before that it can run at all
+                _say(found, path, scene.frames)
+                untold = False
             report.frames = frames
             tick(frames)
 
