@@ -204,18 +204,18 @@ class NumPy(Contestant):
         self.ends = ((node == at) * 1.0 - (node == to)).astype(np.float32)
         self.corners = sum((node == p.faces[:, k]) / 3.0 for k in range(3)).astype(np.float32)
         self.push = (DT / p.mass).astype(np.float32)[:, None, None]
+        self.numbers = [values.astype(np.float32)[:, None] for values in (p.k_s, p.k_d, p.drag)]
 
     def frame(self) -> None:
         p = self.problem
-        column = lambda values: values.astype(np.float32)[:, None]  # noqa: E731
-        k_s, k_d, drag = column(p.k_s), column(p.k_d), column(p.drag)
         for _ in range(SUBSTEPS):
-            rest = column(p.rest * (1 + p.wave * np.sin(2 * math.pi * FREQUENCY * self.t + p.phase)))
-            self.step(k_s, k_d, rest, drag)
+            rest = p.rest * (1 + p.wave * np.sin(2 * math.pi * FREQUENCY * self.t + p.phase))
+            self.step(rest.astype(np.float32)[:, None])
             self.t += DT
 
-    def step(self, k_s: Array, k_d: Array, rest: Array, drag: Array) -> None:
+    def step(self, rest: Array) -> None:
         p, x, v = self.problem, self.x, self.v
+        k_s, k_d, drag = self.numbers
         (at, to), (a, b, c) = p.springs.T, p.faces.T
         d, dv = x[at] - x[to], v[at] - v[to]
         square, along = np.einsum("eka,eka->ea", d, d), np.einsum("eka,eka->ea", d, dv)

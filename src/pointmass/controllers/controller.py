@@ -5,11 +5,24 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pointmass.description import Described
 from pointmass.errors import InvalidInput, number
-from pointmass.laws.parameter import Parameter
+from pointmass.laws.elements import ElementForce
+from pointmass.laws.parameter import Parameter, Rows
 from pointmass.system import ParticleSystem
+
+
+def elements_of(
+    system: ParticleSystem, kind: type[ElementForce], ids: NDArray[np.int64]
+) -> list[tuple[ElementForce, Rows]]:
+    """Forces of a kind that act between particles with some ids, each with the numbers of the elements that do.
+
+    A force may have elements of several bodies, see `bodies.join`.
+    """
+    found = [(force, force.among(ids)) for force in system.forces if isinstance(force, kind)]
+    return [(force, rows) for force, rows in found if len(rows)]
 
 
 class Controller(Described):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pointmass.collisions.collider import unit
-from pointmass.controllers.controller import Controller
+from pointmass.controllers.controller import Controller, elements_of
 from pointmass.errors import InvalidInput, number
 from pointmass.forces.muscles import Muscles
 from pointmass.laws.parameter import Parameter, Vector
@@ -63,8 +63,7 @@ class Steer(Controller):
         """Find the body's muscles, and see that the goal can be reached."""
         p = system.particles
         mine = self._ids(p, "")
-        found = [(f, f.among(mine)) for f in system.forces if isinstance(f, Muscles)]
-        found = [(force, rows) for force, rows in found if len(rows)]
+        found = elements_of(system, Muscles, mine)
         if not found:
             raise InvalidInput(f"controller steer needs muscles, and body {self.on!r} has none")
         left, right = self._ids(p, "left"), self._ids(p, "right")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pointmass.bodies.fish import GRAPH, NODES, NOSE, RINGS, SHAPE
 from pointmass.collisions.collider import directions, lengths
+from pointmass.controllers.controller import elements_of
 from pointmass.errors import InvalidInput
 from pointmass.forces.fins import Fins
 from pointmass.forces.muscles import Muscles
@@ -60,8 +61,7 @@ class Swimmers:
             mine = p.id[p.select(name)]
             fish, rest = divmod(len(mine), NODES)
             for kind, each, own in ((Muscles, MUSCLES, self._muscles), (Fins, 1, self._fins)):
-                parts = [(f, f.among(mine)) for f in system.forces if isinstance(f, kind)]
-                parts = [(force, rows) for force, rows in parts if len(rows)]
+                parts = elements_of(system, kind, mine)
                 if rest or len(parts) != 1 or len(parts[0][1]) != each * fish:
                     raise InvalidInput(f"{name!r} has no muscles and fins of fish: it must be a body made by pm.fish()")
                 own.append((*parts[0], slice(first, first + fish)))

@@ -235,15 +235,18 @@ class ContactText:
                 self._clear_by_hull(k, apart, dtype, table, lines)
             elif surface.laws not in looped:
                 looped.add(surface.laws)
-                each = ClearLines()
-                self._clear_by_hull("k", apart, dtype, table, each)
-                kind = self._kinds.index(surface.laws)
-                lines.lane += [
-                    "for k in range(SURFACES):",
-                    f"    if {table}[k * ROW + KIND] == {kind} and {table}[k * ROW + MOTION] == 0:",
-                    *indented([*each.once, *each.lane], 2),
-                ]
+                lines.lane += self._clear_by_hulls(self._kinds.index(surface.laws), apart, dtype, table)
         return lines
+
+    def _clear_by_hulls(self, kind: int, apart: Traced, dtype: str, table: str) -> list[str]:
+        """`_clear_by_hull` of all surfaces at rest of a kind, in a loop."""
+        each = ClearLines()
+        self._clear_by_hull("k", apart, dtype, table, each)
+        return [
+            "for k in range(SURFACES):",
+            f"    if {table}[k * ROW + KIND] == {kind} and {table}[k * ROW + MOTION] == 0:",
+            *indented([*each.once, *each.lane], 2),
+        ]
 
     def _clear_of_plane(self, k: int, dtype: str, table: str, lines: ClearLines) -> None:
         """The control points of the paths, whose hulls they do not leave, are all on the free side: the ends, and those

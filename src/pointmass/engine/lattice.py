@@ -89,14 +89,14 @@ def _sum(terms: list[list[str]], fresh: bool) -> list[str]:
 
 
 def _runs(places: Sequence[int], call: str) -> list[str]:
-    """A call for component `c` at each `place`, as loops over places in a row: a call that is printed once is compiled
+    """A call for each component c at its `place`, as loops over places in a row: what is printed once is compiled
     once."""
     lines, begin = [], 0
     for end in range(1, len(places) + 1):
         if end < len(places) and places[end] == places[end - 1] + 1:
             continue
         lines.append(f"for c in range({begin}, {end}):")
-        lines.append("    " + call.format(place=f"({places[begin] - begin} + c)", c="c"))
+        lines.append("    " + call.format(place=f"({places[begin] - begin} + c)"))
         begin = end
     return lines
 
@@ -331,17 +331,17 @@ class LatticeKernel:
     def _tile(self) -> list[str]:
         """The function that takes the particles of one tile through a few steps."""
         halo = self.reach * len(self.phases)
-        load = _runs(self.state, "bring(s, o + {place} * WIDTH, Y, ({c} * m + r) * n, left, n)")
+        load = _runs(self.state, "bring(s, o + {place} * WIDTH, Y, (c * m + r) * n, left, n)")
         if "X0 x" in self.row.places:
             places = [self.row.component(f"{q}0 {a}") for q in STATE for a in AXES]
-            load += _runs(places, "bring(s, o + {place} * WIDTH, Y, ({c} * m + r) * n, left, n)")
+            load += _runs(places, "bring(s, o + {place} * WIDTH, Y, (c * m + r) * n, left, n)")
         places = [self.row.component(f"{t.name} {column}") for t in self.columns() for column in range(len(t.getters))]
-        fill = _runs(places, "bring(s, o + {place} * WIDTH, K, O[2 * {c}] + r * O[2 * {c} + 1], left, n)")
+        fill = _runs(places, "bring(s, o + {place} * WIDTH, K, O[2 * c] + r * O[2 * c + 1], left, n)")
         masks = []
         for k, columns in enumerate(self.masks):
             masks.append(f"masks[{k} * WIDTH + i] = R(1) if left + i >= 0 and left + i < n - {columns} else R(0)")
         count = "min(INNER, n - left - PAD)"
-        keep = _runs(self.state, f"keep(s, o + {{place}} * WIDTH + PAD, Z, ({{c}} * m + r) * n + left + PAD, {count})")
+        keep = _runs(self.state, f"keep(s, o + {{place}} * WIDTH + PAD, Z, (c * m + r) * n + left + PAD, {count})")
         lead = []
         if self.leads:
             lead = [

@@ -286,8 +286,9 @@ class Pairs:
         ]
         given = ["base", "s", "e", reach, *sides, *"HWKLNX", *"A" * self.one_way, "x"]
         search = self._search(bool(sides))
-        name = self._searches.setdefault("\n".join(search), f"build{j}")
-        printed = [f"@njit({self.flags})", f"def {name}{search[0]}", *search[1:], "", ""] * (name == f"build{j}")
+        mine = f"build{j}"
+        name = self._searches.setdefault("\n".join(search), mine)
+        printed = [f"@njit({self.flags})", f"def {mine}{search[0]}", *search[1:], "", ""] if name == mine else []
         build = f"{name}({', '.join(given)})"
         body = [
             f"cut2 = {reach} * {reach}",

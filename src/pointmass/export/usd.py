@@ -115,17 +115,15 @@ class _Prim:
         """The values of a frame, by names of attributes."""
         from pxr import UsdGeom
 
-        for name, value in values.items():
-            if name not in self._values:
-                self._values[name] = _Value(self._attribute(name), self._first)
-            self._values[name].put(value, number)
         points = values["points"]
         if len(points):
             wide = values.get("widths", np.zeros(1, np.float32))
             extent = UsdGeom.Points.ComputeExtent(points, np.broadcast_to(wide, len(points)).copy())
-            if "extent" not in self._values:
-                self._values["extent"] = _Value(self._attribute("extent"), self._first)
-            self._values["extent"].put(np.array(extent, np.float32), number)
+            values = {**values, "extent": np.array(extent, np.float32)}
+        for name, value in values.items():
+            if name not in self._values:
+                self._values[name] = _Value(self._attribute(name), self._first)
+            self._values[name].put(value, number)
 
     def show(self, visible: bool, number: int) -> None:
         """Whether it is there in this frame."""

@@ -54,9 +54,9 @@ class Avoid(UnaryForce):
     def law(self, x: Any, v: Any, m: Any, t: Any, *parameters: Any) -> Any:
         """Force [N]."""
         own = dict(zip(self.parameters, parameters, strict=True))
-        force: Any = (0.0, 0.0, 0.0)
-        for distance, normal in self.solids.met(x, own):
+
+        def push(distance: Any, normal: Any) -> Any:
             reach = own["distance"] + own["horizon"] * fn.maximum(-fn.dot(v, normal), 0.0)
-            push = m * own["strength"] * fn.maximum(1.0 - distance / reach, 0.0)
-            force = fn.add(force, fn.scale(push, normal))
-        return force
+            return m * own["strength"] * fn.maximum(1.0 - distance / reach, 0.0)
+
+        return self.solids.pushes(x, own, push)

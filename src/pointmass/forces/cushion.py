@@ -57,12 +57,12 @@ class Cushion(UnaryForce):
     def law(self, x: Any, v: Any, m: Any, t: Any, *parameters: Any) -> Any:
         """Force [N]."""
         own = dict(zip(self.parameters, parameters, strict=True))
-        force: Any = (0.0, 0.0, 0.0)
-        for distance, normal in self.solids.met(x, own):
+
+        def push(distance: Any, normal: Any) -> Any:
             depth = fn.maximum(own["thickness"] - distance, 0.0)
-            push = own["k_s"] * depth * fn.maximum(1.0 - own["damping"] * fn.dot(v, normal), 0.0)
-            force = fn.add(force, fn.scale(push, normal))
-        return force
+            return own["k_s"] * depth * fn.maximum(1.0 - own["damping"] * fn.dot(v, normal), 0.0)
+
+        return self.solids.pushes(x, own, push)
 
     @cached_property
     def traced_potential(self) -> Traced | None:

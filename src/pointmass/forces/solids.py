@@ -76,6 +76,13 @@ class Solids:
             numbers = (Parameter(f"around{k}_{j}", number) for j, number in enumerate(surface.shape))
             self.parameters += [place, *numbers]
 
+    def pushes(self, x: Triple, own: Mapping[str, Any], push: Callable[[Any, Triple], Any]) -> Triple:
+        """Force of all surfaces, each along its normal, with the strength `push(distance, normal)` [N]."""
+        force: Triple = (0.0, 0.0, 0.0)
+        for distance, normal in self.met(x, own):
+            force = fn.add(force, fn.scale(push(distance, normal), normal))
+        return force
+
     def met(self, x: Triple, own: Mapping[str, Any]) -> list[tuple[Any, Triple]]:
         """Signed distance [m] from each surface, and its normal.
 

@@ -169,21 +169,22 @@ class Parameter:
             A number that is not allowed, another count than before, a parameter that is a function of t or a vector, or
             that is one number where only some should change.
         """
-        (component, *more) = self.components
-        if more or isinstance(component.value, Traced):
+        if not self.may_be_put:
             raise InvalidInput(f"{self.name} cannot be controlled: it is a vector or a function of t")
-        old, array = component.value, np.asarray(values, np.float64)
+        (component,) = self.components
+        old, array, part = component.value, np.asarray(values, np.float64), slice(None) if rows is None else rows
         if rows is not None and not isinstance(old, np.ndarray):
             raise InvalidInput(f"{self.name} is one number for all: give each its own, if only some should change")
-        shape = np.shape(old if rows is None else old[rows])  # type: ignore[index]
+        shape = old[part].shape if isinstance(old, np.ndarray) else ()
         if array.ndim > 1 or (isinstance(old, np.ndarray) and array.ndim and array.shape != shape):
             raise InvalidInput(f"{self.name} takes one number or {shape}, not an array of shape {array.shape}")
         component._check(array)
         if isinstance(old, np.ndarray):
             whole = old.copy()
-            whole[slice(None) if rows is None else rows] = array
-            array = whole
-        component.value = read_only(array.copy()) if array.ndim else float(array)
+            whole[part] = array
+            component.value = read_only(whole)
+        else:
+            component.value = read_only(array.copy()) if array.ndim else float(array)
 
     @property
     def may_be_put(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,14 +24,38 @@ from pointmass.scenes.fish import DRAG, SUBSTEPS
 from pointmass.solvers import SymplecticEuler
 
 HIGH, DEEP = 0.42, 0.5  # of the tank, relative to its width
-SMALL, TALL, BIG = 0.05, 0.07, 0.19  # lengths of a school's fish, of a grazer, of the pike, likewise
-TIRED = 0.4  # speed of the pike: it is longer, so that a chase is open
 STONES = ((0.24, 0.02, 0.07), (-0.27, -0.08, 0.06), (-0.14, 0.1, 0.04), (0.38, 0.12, 0.05), (0.05, -0.17, 0.06))
 LEAF = 9  # points of a plant
 LINE = 0.02  # mass of a metre of a plant [kg/m]
 LIFT = 3.0  # acceleration with which a plant rises in the water [m/s^2]
 SINK = 0.04  # speed with which food sinks [m/s]
 DRAWN = 0.1  # time in which water takes plants and food along [s]
+
+
+class Kind(NamedTuple):
+    """Fish of a kind.
+
+    Attributes
+    ----------
+    size : length, relative to the width of the tank.
+    role, habit, speed : for `FishBrain`: kind, schools and vigour.
+    side : where they begin, from -1 at the left end of the tank to 1 at the right.
+    way : where they look, 1 to the right and -1 to the left.
+    """
+
+    size: float
+    role: str
+    habit: str
+    speed: float
+    side: float
+    way: float
+
+
+KINDS = {  # by the knob that says how many; a pike is longer and slower, so that a chase is open
+    "school": Kind(0.05, "prey", "always", 1.0, -0.35, 1.0),
+    "grazers": Kind(0.07, "pacifist", "none", 0.7, 0.1, 1.0),
+    "pikes": Kind(0.19, "predator", "none", 0.4, 0.6, -1.0),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,13 +105,8 @@ class Aquarium(ShippedScene):
         rate, (far, high, _) = 2 * math.pi / self.swell, self.half.tolist()
         to_and_fro = f"{self.current!r}*sin({rate!r}*t + 2*x)*(0.4 + 0.6*y/{high!r})"
         tide = Flow((f"{to_and_fro}*max(1 - (x/{far!r})**2, 0)", 0, 0))  # none at the glass
-        kinds = {
-            "school": (self.school, SMALL, "prey", "always", 1.0),
-            "grazers": (self.grazers, TALL, "pacifist", "none", 0.7),
-            "pikes": (self.pikes, BIG, "predator", "none", TIRED),
-        }
-        kinds = {name: kind for name, kind in kinds.items() if kind[0]}
-        bodies = {name: self._shoal(name, count, size * self.width, tide) for name, (count, size, *_) in kinds.items()}
+        kinds = {name: kind for name, kind in KINDS.items() if getattr(self, name)}
+        bodies = {name: self._shoal(name, kind, tide) for name, kind in kinds.items()}
         forces: list[Any] = []
         if self.food:
             bodies["food"] = points(self._anywhere("food", self.food, 1.9), m=1e-4)
@@ -96,19 +115,18 @@ class Aquarium(ShippedScene):
             bodies["plants"] = leaves = self._meadow()
             k = float(leaves.particles.m.mean()) / DRAWN
             forces += [Gravity((0.0, LIFT, 0.0), on="plants"), Wind(tide, k=k, on="plants")]
-        _, _, roles, habits, vigour = zip(*kinds.values(), strict=True)
         top = self.middle + self.half * (0.0, 0.7, 0.0)
         brain = FishBrain(
             list(kinds),
-            roles,
+            [kind.role for kind in kinds.values()],
             food="food" if self.food else "",
-            schools=habits,
+            schools=[kind.habit for kind in kinds.values()],
             sight=0.5 * self.width,
             smell=0.3 * self.width,
             home=(*self.middle, 0.4 * self.width),
             feeding=(*top, *(1.6 * self.half * (1.0, 0.1, 1.0))),
             frequency=self.frequency,
-            vigour=vigour,
+            vigour=[kind.speed for kind in kinds.values()],
         )
         return Scene(
             name=self.name,
@@ -149,10 +167,11 @@ class Aquarium(ShippedScene):
         away = float(np.abs(self._leaves(last)[:, 0] - self._leaves(first)[:, 0]).max(initial=0.0))
         expect(away == 0.0, f"a root is {away:.2g} m from where it grew")
         done = 0
-        for count, size in ((self.school, SMALL), (self.grazers, TALL), (self.pikes, BIG)):
+        for name, kind in KINDS.items():
+            count = getattr(self, name)
             x = last.positions[done : done + NODES * count].reshape(count, NODES, 3)
             done += NODES * count
-            wide = float(np.linalg.norm(np.ptp(x, axis=1), axis=1).max(initial=0.0)) / (size * self.width)
+            wide = float(np.linalg.norm(np.ptp(x, axis=1), axis=1).max(initial=0.0)) / (kind.size * self.width)
             expect(wide < 1.6, f"a fish is {wide:.2f} times as long as it should be")
 
     # ---------------------------------------------------------------------------------------------- inside
@@ -162,16 +181,16 @@ class Aquarium(ShippedScene):
         u = np.stack([random.uniform(self.seed, name, np.arange(count), axis)[:, 0] for axis in "xyz"], axis=1)
         return self.middle + share * (u - 0.5) * self.half
 
-    def _shoal(self, name: str, count: int, length: float, tide: Flow) -> Body:
+    def _shoal(self, name: str, kind: Kind, tide: Flow) -> Body:
         """Fish of a kind in a block above the stones, in their part of the tank."""
-        side = {"school": -0.35, "grazers": 0.1, "pikes": 0.6}[name]
+        count, length = getattr(self, name), kind.size * self.width
         n = math.ceil(count ** (1 / 3))
         k = np.arange(count)
         row = np.stack([k // n**2, k // n % n, k % n], axis=1) - 0.5 * (n - 1)
         step = np.minimum(1.3 * length, self.half * (0.7, 0.7, 1.4) / n)
         stray = 0.15 * (self._anywhere(name, count, 1.0) - self.middle) / self.half * step
-        places = self.middle + self.half * (side, 0.3, 0.0) + row * step + stray
-        way = (-1.0 if name == "pikes" else 1.0, 0.0, 0.0)
+        places = self.middle + self.half * (kind.side, 0.3, 0.0) + row * step + stray
+        way = (kind.way, 0.0, 0.0)
         return fish(count, places, way, length=length, drag=DRAG * length, current=tide, detail=1 if count > 12 else 2)
 
     def _meadow(self) -> Body:
