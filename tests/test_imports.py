@@ -30,6 +30,7 @@ HEAVY = (
     "gsd",
 )
 SOURCES = Path(pm.__file__).parent
+PIPELINES = "render/inner.py", "engine/inner.py", "engine/passes.py"
 TEXTS = (
     "engine/support.py",
     "engine/contact_text.py",
@@ -89,6 +90,6 @@ def test_numba_is_imported_by_kernels_and_on_first_use_only() -> None:
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             if any(name.split(".")[0] == "numba" for name in names):
-                kernel = path.name.startswith("kernels") or where in ("render/inner.py", "engine/inner.py", *TEXTS)
+                kernel = path.name.startswith("kernels") or where in (*PIPELINES, *TEXTS)
                 lazy = id(node) not in first and where.split("/")[0] in ("render", "engine", "cli")
                 assert kernel or lazy, f"{where} line {node.lineno} imports numba"

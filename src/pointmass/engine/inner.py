@@ -2,40 +2,44 @@
 
 A kernel is many small functions and one entry that Python calls. Numba would optimise each of them and make machine
 code for it, although all of them end up in the entry, where that is done anyway; so of the inner ones only the LLVM
-text is kept. They are plain scalar code, so that most of Numba's passes have nothing to do. Together that takes a third
-off the time of compiling.
+text is kept. They are plain scalar code, so that most of Numba's passes have nothing to do (what is left of them is in
+passes.py). Loops of all threads are functions of their own (outlining.py), and what Numba makes of one is text, too.
 """
 # mypy: disable-error-code="no-untyped-call"
 
 from __future__ import annotations
 
 import operator
+from copy import copy
 from typing import Any
 
 from numba.core import typed_passes, types, untyped_passes
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase
+from numba.core.compiler import Compiler, CompilerBase
 from numba.core.compiler_machinery import PassManager
 from numba.core.typing.context import Context
+
+from pointmass.engine import passes
 
 PASSES = (  # what there is for closures, `with`, array expressions and prange is left out
     untyped_passes.TranslateByteCode,
     untyped_passes.FixupArgs,
-    untyped_passes.IRProcessing,
+    passes.Process,
     untyped_passes.RewriteSemanticConstants,
     untyped_passes.DeadBranchPrune,
     untyped_passes.GenericRewrites,
     untyped_passes.InlineInlinables,
-    untyped_passes.ReconstructSSA,
+    passes.AssignOnce,
     typed_passes.NopythonTypeInference,
-    typed_passes.PreLowerStripPhis,
+    passes.StripPhis,
     typed_passes.InlineOverloads,
-    typed_passes.IRLegalization,
+    passes.EndLives,
     typed_passes.AnnotateTypes,
     typed_passes.NativeLowering,
     typed_passes.NoPythonBackend,
 )
-OPERATORS = frozenset(value for value in vars(operator).values() if callable(value))
+OPERATORS = frozenset([min, max, bool, int, *(value for value in vars(operator).values() if callable(value))])
+PLAIN = types.Number, types.Boolean, types.Array
 SIGNATURES: dict[Any, Any] = {}  # of operators and the numbers that they take
 
 
@@ -51,6 +55,28 @@ class Inner(CompilerBase):
             manager.add_pass(each, each.__name__)
         manager.finalize()
         return [manager]
+
+
+class Loop(Compiler):
+    """Numba's compiler for loops of all threads, whose many small functions are text, too."""
+
+    def __init__(self, typing: Context, target: Any, library: None, *more: Any) -> None:
+        texts = copy(target)
+        texts._internal_codegen = _Texts(target.codegen())
+        super().__init__(_Remembering(typing), texts, None, *more)
+
+
+class _Texts:
+    """What makes libraries, if they are text."""
+
+    def __init__(self, codegen: Any) -> None:
+        self._codegen = codegen
+
+    def create_library(self, name: str, **options: Any) -> _Text:
+        return _Text(self._codegen, name)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._codegen, name)
 
 
 class _Text(JITCodeLibrary):
@@ -86,8 +112,8 @@ class _Remembering(Context):
         self.__dict__ = context.__dict__
 
     def resolve_function_type(self, func: Any, args: Any, kws: Any) -> Any:
-        numbers = all(isinstance(a, (types.Number, types.Boolean)) for a in args)
-        if not numbers or kws or getattr(func, "typing_key", None) not in OPERATORS:
+        plain = all(isinstance(a, PLAIN) for a in args)
+        if not plain or kws or getattr(func, "typing_key", func) not in OPERATORS:
             return super().resolve_function_type(func, args, kws)
         if (func, args) not in SIGNATURES:
             SIGNATURES[func, args] = super().resolve_function_type(func, args, kws)

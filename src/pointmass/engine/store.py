@@ -22,6 +22,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from pointmass.engine.outlining import outlined
 from pointmass.engine.threads import heed_environment
 
 HEADER = '''"""{title}
@@ -32,13 +33,15 @@ Printed by pointmass {version} for {dtype}. It runs without Numba too: delete th
 import numpy as np
 from numba import njit, prange
 
-from pointmass.engine.inner import Inner
+from pointmass.engine.inner import Inner, Loop
 from pointmass.engine.support import added, columns, more_columns, put_back, subtracted
 from pointmass.engine.support import exponent, mixed, scaled, select, significand, streamed
 
 R = np.{dtype}
-OWNING = {{"_nrt": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True{fast}}}
-FLAGS = {{**OWNING, "_nrt": False, "pipeline_class": Inner}}  # of what makes no arrays: nobody counts references
+TEXT = {{"pipeline_class": Inner, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}}  # of what only kernels call
+OWNING = {{**TEXT, "_nrt": True, "error_model": "numpy"{fast}}}
+FLAGS = {{**OWNING, "_nrt": False}}  # of what makes no arrays: nobody counts references
+LOOP = {{**OWNING, "parallel": True, "pipeline_class": Loop}}  # of loops of all threads
 APART = FLAGS | {{"forceinline": False}}  # Numba takes it over from the caller that is compiled first
 ENTRY = {{"_nrt": False, "error_model": "numpy", "cache": True, "nogil": True{fast}}}  # of what Python calls
 OWNING_ENTRY = {{**ENTRY, "_nrt": True}}
@@ -63,7 +66,7 @@ def complete(title: str, text: str, dtype: str) -> str:
     from pointmass import __version__
 
     head = HEADER.format(title=title, version=__version__, dtype=dtype, fast=FAST if dtype == "float32" else "")
-    return head + text
+    return head + outlined(text)
 
 
 def load(title: str, text: str, dtype: str) -> ModuleType:
@@ -73,7 +76,7 @@ def load(title: str, text: str, dtype: str) -> ModuleType:
     ----------
     title : one line that says what it is.
     text : functions, with the names that the header provides: np, njit, prange, R, FLAGS, ENTRY,
-        and OWNING, OWNING_ENTRY for those that make arrays.
+        and OWNING, OWNING_ENTRY for those that make arrays. Loops of all threads become functions (`outlined`).
     dtype : "float64" or "float32".
     """
     heed_environment()

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload, register_jitable
+from numba.core.typing.templates import infer, infer_global, make_intrinsic_template
+from numba.extending import register_jitable
 
 from pointmass.engine.threads import LINE
 from pointmass.tracing import noise
@@ -16,6 +18,22 @@ from pointmass.tracing import noise
 TINY = 2.0**-1022
 RAISE = 2.0**54
 LIMIT = 2000.0
+
+
+def compiled_as(function: Any) -> Callable[[Any], Any]:
+    """That compiled code builds a call of a plain function itself, from types to instructions as with `intrinsic`.
+
+    An overload that calls an intrinsic does the same, but Numba would put its body into each caller first, and search
+    all of the caller for what that leaves over.
+    """
+
+    def registered(define: Any) -> Any:
+        template = make_intrinsic_template(function, define, function.__name__)  # type: ignore[no-untyped-call]
+        infer(template)  # type: ignore[no-untyped-call]
+        infer_global(function, types.Function(template))  # type: ignore[no-untyped-call]
+        return define
+
+    return registered
 
 
 def power_of_two(k: Any) -> Any:
@@ -33,44 +51,29 @@ def float_of(bits: Any) -> Any:
     return float(np.int64(bits).view(np.float64))
 
 
-@intrinsic
-def _to_bits(typingctx: Any, a: Any) -> Any:
+@compiled_as(bits_of)
+def _bits_of(typing: Any, a: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.bitcast(arguments[0], ir.IntType(64))
 
     return types.int64(types.float64), build
 
 
-@intrinsic
-def _from_bits(typingctx: Any, a: Any) -> Any:
+@compiled_as(float_of)
+def _float_of(typing: Any, bits: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.bitcast(arguments[0], ir.DoubleType())
 
     return types.float64(types.int64), build
 
 
-@overload(bits_of, inline="always")
-def _bits_of(a: Any) -> Any:
-    def compiled(a: Any) -> Any:
-        return _to_bits(np.float64(a))  # type: ignore[call-arg]
+@compiled_as(power_of_two)
+def _power_of_two(typing: Any, k: Any) -> Any:
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        number = ir.IntType(64)
+        return builder.bitcast(builder.shl(builder.add(arguments[0], number(1023)), number(52)), ir.DoubleType())
 
-    return compiled
-
-
-@overload(float_of, inline="always")
-def _float_of(bits: Any) -> Any:
-    def compiled(bits: Any) -> Any:
-        return _from_bits(np.int64(bits))  # type: ignore[call-arg]
-
-    return compiled
-
-
-@overload(power_of_two, inline="always")
-def _power_of_two(k: Any) -> Any:
-    def compiled(k: Any) -> Any:
-        return _from_bits(np.int64((np.int64(k) + 1023) << 52))  # type: ignore[call-arg]
-
-    return compiled
+    return types.float64(types.int64), build
 
 
 @register_jitable
@@ -110,21 +113,13 @@ def select(condition: Any, a: Any, b: Any) -> Any:
     return a if condition else b
 
 
-@intrinsic
-def _select(typingctx: Any, condition: Any, a: Any, b: Any) -> Any:
+@compiled_as(select)
+def _select(typing: Any, condition: Any, a: Any, b: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         condition, a, b = arguments
         return builder.select(builder.trunc(condition, ir.IntType(1)) if condition.type.width > 1 else condition, a, b)
 
     return a(types.boolean, a, a), build
-
-
-@overload(select, inline="always")
-def _compiled_select(condition: Any, a: Any, b: Any) -> Any:
-    def compiled(condition: Any, a: Any, b: Any) -> Any:
-        return _select(condition, a, b)  # type: ignore[call-arg]  # Numba gives the context
-
-    return compiled
 
 
 def columns(target: Any, o: Any, width: int, source: Any, rows: Any, q: Any, step: int) -> None:
@@ -189,11 +184,11 @@ def _record(context: Any, builder: Any, kind: Any, array: Any, row: Any, count: 
     return _vector(context, builder, kind, array, first, count)
 
 
-def _turned(count: int) -> Any:
+def _turn(function: Any, count: int) -> None:
     """Eight records into so many columns."""
 
-    @intrinsic
-    def turned(typingctx: Any, target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
+    @compiled_as(function)
+    def turned(typing: Any, target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
         def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             target, o, width, source, rows, q, step = arguments
             kinds = dict(zip(("target", "source", "rows"), (signature.args[k] for k in (0, 3, 4)), strict=True))
@@ -220,14 +215,13 @@ def _turned(count: int) -> Any:
         number = types.uintp
         return types.void(target, number, number, source, rows, number, number), build
 
-    return turned
+
+_turn(columns, 6)
+_turn(more_columns, 7)
 
 
-_columns, _more_columns = _turned(6), _turned(7)
-
-
-@intrinsic
-def _put_back(typingctx: Any, target: Any, rows: Any, q: Any, step: Any, source: Any, o: Any, width: Any) -> Any:
+@compiled_as(put_back)
+def _put_back(typing: Any, target: Any, rows: Any, q: Any, step: Any, source: Any, o: Any, width: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         target, rows, q, step, source, o, width = arguments
         places = context.make_array(signature.args[1])(context, builder, rows).data
@@ -252,9 +246,9 @@ def _picked(builder: Any, a: Any, b: Any, which: tuple[int, ...]) -> Any:
     return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(ir.IntType(32), len(which)), list(which)))
 
 
-def _sum(operation: str) -> Any:
-    @intrinsic
-    def changed(typingctx: Any, target: Any, o: Any, source: Any, q: Any) -> Any:
+def _change(function: Any, operation: str) -> None:
+    @compiled_as(function)
+    def changed(typing: Any, target: Any, o: Any, source: Any, q: Any) -> Any:
         def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             target, o, source, q = arguments
             mine, align = _vector(context, builder, signature.args[0], target, o, 4)
@@ -265,38 +259,13 @@ def _sum(operation: str) -> Any:
 
         return types.void(target, types.uintp, source, types.uintp), build
 
-    return changed
+
+_change(added, "fadd")
+_change(subtracted, "fsub")
 
 
-_added, _subtracted = _sum("fadd"), _sum("fsub")
-
-
-@overload(columns, inline="always")
-def _compiled_columns(target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
-    def compiled(target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
-        return _columns(target, o, width, source, rows, q, step)
-
-    return compiled
-
-
-@overload(more_columns, inline="always")
-def _compiled_more(target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
-    def compiled(target: Any, o: Any, width: Any, source: Any, rows: Any, q: Any, step: Any) -> Any:
-        return _more_columns(target, o, width, source, rows, q, step)
-
-    return compiled
-
-
-@overload(put_back, inline="always")
-def _compiled_put_back(target: Any, rows: Any, q: Any, step: Any, source: Any, o: Any, width: Any) -> Any:
-    def compiled(target: Any, rows: Any, q: Any, step: Any, source: Any, o: Any, width: Any) -> Any:
-        return _put_back(target, rows, q, step, source, o, width)  # type: ignore[call-arg]
-
-    return compiled
-
-
-@intrinsic
-def _streamed(typingctx: Any, target: Any, o: Any, source: Any) -> Any:
+@compiled_as(streamed)
+def _streamed(typing: Any, target: Any, o: Any, source: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         target, o, source = arguments
         kind = signature.args[0]
@@ -315,27 +284,3 @@ def _streamed(typingctx: Any, target: Any, o: Any, source: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(target, types.uintp, source), build
-
-
-@overload(streamed, inline="always")
-def _compiled_streamed(target: Any, o: Any, source: Any) -> Any:
-    def compiled(target: Any, o: Any, source: Any) -> Any:
-        return _streamed(target, o, source)  # type: ignore[call-arg]
-
-    return compiled
-
-
-@overload(added, inline="always")
-def _compiled_added(target: Any, o: Any, source: Any, q: Any) -> Any:
-    def compiled(target: Any, o: Any, source: Any, q: Any) -> Any:
-        return _added(target, o, source, q)
-
-    return compiled
-
-
-@overload(subtracted, inline="always")
-def _compiled_subtracted(target: Any, o: Any, source: Any, q: Any) -> Any:
-    def compiled(target: Any, o: Any, source: Any, q: Any) -> Any:
-        return _subtracted(target, o, source, q)
-
-    return compiled
