@@ -41,12 +41,11 @@ class _Function:
 
     def __init__(self, lines: Sequence[str], node: ast.FunctionDef) -> None:
         self.lines, self.node = lines, node
-        self.own = [a.arg for a in node.args.args]
         loops = [n for n in ast.walk(node) if isinstance(n, ast.For) and _called(n.iter) == "prange"]
         loops.sort(key=lambda loop: loop.lineno)
         bodies = {id(n) for loop in loops for each in loop.body for n in ast.walk(each)}
         around = [n for n in ast.walk(node) if id(n) not in bodies]
-        self.known = {*self.own, *_names(around, ast.Store)}
+        self.known = {*(a.arg for a in node.args.args), *_names(around, ast.Store)}
         self.loops = [self._loop(k, loop, set(_names(around, ast.Load))) for k, loop in enumerate(loops)]
 
     def text(self) -> list[str]:
@@ -114,12 +113,11 @@ class _Loop:
             *indented([*loop, *more], 1),
             *back,
         ]
-        return [
-            *function(
-                f"{self.name}_one", f"{self.index}, {arguments}", f"forceinline=True, **{flags}", [*begin, *body, *back]
-            ).split("\n")[:-1],
-            *function(self.name, f"count, {arguments}", "**LOOP", around).split("\n")[:-1],
-        ]
+        inner = function(
+            f"{self.name}_one", f"{self.index}, {arguments}", f"forceinline=True, **{flags}", [*begin, *body, *back]
+        )
+        outer = function(self.name, f"count, {arguments}", "**LOOP", around)
+        return [*inner.split("\n")[:-1], *outer.split("\n")[:-1]]
 
     @property
     def _results(self) -> str:
