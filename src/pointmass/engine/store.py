@@ -23,6 +23,7 @@ from types import ModuleType
 from typing import Any
 
 from pointmass.engine.outlining import outlined
+from pointmass.engine.sharing import share
 from pointmass.engine.threads import heed_environment
 
 HEADER = '''"""{title}
@@ -86,9 +87,10 @@ def load(title: str, text: str, dtype: str) -> ModuleType:
     with LOCK:
         if key not in LOADED:
             path = _written(key, source)
+            LOADED[key] = _import(f"pointmass_kernel_{key}", path)
             if not any((path.parent / "__pycache__").glob(f"{key}.*.nbc")):
                 LOGGER.info("compiling %s (once per machine)...", title)
-            LOADED[key] = _import(f"pointmass_kernel_{key}", path)
+                share(LOADED[key], source)
         return LOADED[key]
 
 
