@@ -4,9 +4,9 @@ import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { View } from "./messages";
 
-const FITTED = 16 / 9;
 export const ROOMY = 900; // a narrower picture has no room for parameters beside it [pixels]
-const ASIDE = 120, LIFTED = 24; // [pixels]
+const LIFTED = 24; // [pixels]
+const MOST = 0.6; // of the picture that panels may have before what is behind them stays there
 const EASE = 4; // rate at which it comes to where it is led [1/s]
 
 export class Camera {
@@ -15,7 +15,9 @@ export class Camera {
   private home: View | null = null;
   private readonly aim = new THREE.Vector3();
   private since = 0; // the last picture [ms]
-  covered = 0; // by instruments on the left [pixels]
+  private wide = 0; // tangent of half the angle to the sides that is shown at least
+  coveredLeft = 0; // by instruments [pixels]
+  coveredRight = 0; // by parameters [pixels]
   private led = true; // until the user takes it
   private readonly caster = new THREE.Raycaster();
 
@@ -71,6 +73,7 @@ export class Camera {
     this.eye.up.set(...this.home.up);
     this.eye.position.set(...this.home.position);
     this.orbit.target.set(...this.home.target);
+    this.wide = this.home.wide;
     this.orbit.update();
     this.update();
   }
@@ -82,21 +85,21 @@ export class Camera {
       const part = 1 - Math.exp((-EASE * (now - this.since)) / 1000);
       this.eye.position.lerp(this.aim.set(...this.home.position), part);
       this.orbit.target.lerp(this.aim.set(...this.home.target), part);
+      this.wide += part * (this.home.wide - this.wide);
     }
     this.since = now;
     this.orbit.update();
     const { clientWidth, clientHeight } = this.canvas;
     this.eye.aspect = clientWidth / Math.max(1, clientHeight);
-    const fov = this.home?.fov ?? 35;
-    // The place was found for a picture of 16 to 9: what that shows to the sides, a narrower one shows by a wider angle.
-    // So does one whose middle is not that of the page: nothing is to be beyond its edge.
-    const free = clientWidth > ROOMY ? 1 - Math.max(2 * ASIDE, this.covered) / clientWidth : 1;
-    const narrow = Math.max(1, FITTED / (this.eye.aspect * free));
-    this.eye.fov = 2 * THREE.MathUtils.radToDeg(Math.atan(Math.tan(THREE.MathUtils.degToRad(fov) / 2) * narrow));
+    // What there is to be seen beside the middle is to be in the picture, and not behind panels: a narrow one takes a wider angle.
+    const roomy = clientWidth > ROOMY;
+    const free = roomy ? 1 - Math.min(MOST, (this.coveredLeft + this.coveredRight) / clientWidth) : 1;
+    const high = Math.tan(THREE.MathUtils.degToRad(this.home?.fov ?? 35) / 2);
+    this.eye.fov = 2 * THREE.MathUtils.radToDeg(Math.atan(Math.max(high, this.wide / (this.eye.aspect * free))));
     this.eye.near = this.distance / 200;
     this.eye.far = this.distance * 200;
-    // On a wide screen the middle of the picture is the middle of what the parameters leave free.
-    const aside = clientWidth > ROOMY ? ASIDE - 0.4 * this.covered : 0;
+    // On a wide screen the middle of the picture is the middle of what panels leave free.
+    const aside = roomy ? (this.coveredRight - this.coveredLeft) / 2 : 0;
     this.eye.setViewOffset(clientWidth, clientHeight, aside, LIFTED, clientWidth, clientHeight); // updates the projection
     this.eye.updateMatrixWorld();
   }

@@ -35,7 +35,7 @@ const camera = new Camera(canvas);
 const picture = new Picture(canvas);
 let theme = firstTheme();
 const registry = new Registry(theme);
-const wind = new Wind(canvas, camera, connection); // hears of a press before the grab does
+const wind = new Wind(find("wind"), canvas, camera, connection); // hears of a press before the grab does
 const grab = new Grab(canvas, camera, registry.places, connection);
 const hand = new Hand(canvas, camera, registry.places, grab, connection);
 const plots = new Plots(find("plots"), connection);
@@ -51,6 +51,7 @@ function dress(): void {
   document.documentElement.dataset.theme = theme.name;
   setBackdrop(theme);
   registry.dress(theme);
+  wind.dress(theme);
   plots.dress();
   pick.dress();
 }
@@ -156,7 +157,8 @@ function draw(): void {
   }
   parameters.update();
   timeline.update(newest);
-  camera.covered = document.querySelector("#instruments > section:not([hidden]):not(#legend)") ? instruments.offsetLeft + instruments.offsetWidth : 0;
+  camera.coveredRight = parameters.covers;
+  camera.coveredLeft = document.querySelector("#instruments > section:not([hidden]):not(#legend)") ? instruments.offsetLeft + instruments.offsetWidth : 0;
   camera.update();
   grab.update(newest);
   hand.update(newest);

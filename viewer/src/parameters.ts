@@ -50,6 +50,11 @@ export class Parameters {
     if (this.gui) this.gui.open(this.gui._closed);
   }
 
+  /** How much of the picture is behind them, at the right [pixels]. */
+  get covers(): number {
+    return this.gui && !this.gui._closed && !this.gui._hidden ? innerWidth - this.gui.domElement.offsetLeft : 0;
+  }
+
   /** Once for each picture: what was turned meanwhile. */
   update(): void {
     for (const [name, value] of this.waiting) this.connection.send({ kind: "change", name, value });

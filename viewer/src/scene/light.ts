@@ -22,7 +22,7 @@ export const light = {
   softness: { value: 2 }, // of the shadow's edge [texels]
 };
 
-/** For fragment shaders: `lit(albedo, normal, place, gloss)` and `backdrop()`. */
+/** For fragment shaders: `lit(albedo, normal, place, gloss)`, `ink(glow, strength)` and `backdrop()`. */
 export const LIGHT = /* glsl */ `
 uniform vec3 bottom, top, toKey, middle;
 uniform float ambient, pool, texel;
@@ -34,6 +34,14 @@ uniform mat4 toShadow;
 out highp vec4 result;
 
 vec3 backdrop() { return mix(bottom, top, gl_FragCoord.y / resolution.y); }
+
+/** A glow on a bright backdrop, which light cannot be seen on: laid over it, dark enough to be told from it; faint light is a thin layer. */
+vec4 ink(vec3 glow, float strength) {
+  float peak = max(max(glow.r, glow.g), max(glow.b, 1e-6));
+  vec3 color = glow / peak;
+  color *= min(1.0, 0.4 / dot(color, vec3(0.2126, 0.7152, 0.0722)));
+  return vec4(color, 1.0) * min(1.0, 1.5 * strength * min(1.0, peak));
+}
 
 float unshadowed(vec3 place, vec3 normal) {
   vec4 at = toShadow * vec4(place + normal * texel * 3.0, 1.0);

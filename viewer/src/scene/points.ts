@@ -58,7 +58,7 @@ void main() {
   float rest = 1.0 - square, cube = rest * rest * rest;
   float strength = tone.a * cube * (cube * cube + 0.15);
 #ifdef DARKENS
-  result = vec4(min(tone.rgb, vec3(1.0)), 1.0) * min(1.0, strength * 1.5);
+  result = ink(tone.rgb, strength);
 #else
   result = vec4(tone.rgb * strength, 0.0);
 #endif
