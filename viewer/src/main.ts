@@ -108,6 +108,7 @@ const keys = new Keys(find<HTMLDialogElement>("help"), [
   { key: "e", shown: "E", does: "the next lens", action: () => lens.next() },
   { key: "v", shown: "V", does: "velocities", action: () => lens.arrows("velocity") },
   { key: "k", shown: "K", does: "forces", action: () => lens.arrows("force") },
+  { key: "q", shown: "Q", does: "contacts with surfaces", action: () => lens.arrows("contact") },
   { key: "u", shown: "U", does: "arrows of the field", action: () => lens.arrows("field") },
   { key: "h", shown: "H", does: "streamlines", action: () => lens.arrows("streamlines") },
   { key: "y", shown: "Y", does: "integral curves: click where they start", action: () => curves.toggle() },
