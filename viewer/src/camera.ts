@@ -5,8 +5,10 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { View } from "./messages";
 
 export const ROOMY = 900; // a narrower picture has no room for parameters beside it [pixels]
+const NARROW = 700; // and one that is narrower has them above and below its middle, as style.css says [pixels]
 const LIFTED = 24; // [pixels]
-const MOST = 0.6; // of the picture that panels may have before what is behind them stays there
+const BARS = 120; // at the top and the bottom, together [pixels]
+const MOST = 0.6; // of the picture's width, or height, that is left to panels and bars; what is behind more than that stays there
 const EASE = 4; // rate at which it comes to where it is led [1/s]
 
 export class Camera {
@@ -16,8 +18,7 @@ export class Camera {
   private readonly aim = new THREE.Vector3();
   private since = 0; // the last picture [ms]
   private wide = 0; // tangent of half the angle to the sides that is shown at least
-  coveredLeft = 0; // by instruments [pixels]
-  coveredRight = 0; // by parameters [pixels]
+  private covered = { left: 0, right: 0, top: 0, bottom: 0 }; // by panels [pixels]
   private led = true; // until the user takes it
   private readonly caster = new THREE.Raycaster();
 
@@ -78,6 +79,15 @@ export class Camera {
     this.update();
   }
 
+  /** Panels that are open: beside the picture's middle, or, where there is no room, above and below it. */
+  behind(instruments: DOMRect | null, parameters: DOMRect | null): void {
+    const { clientWidth, clientHeight } = this.canvas;
+    this.covered =
+      clientWidth >= NARROW
+        ? { left: instruments?.right ?? 0, right: parameters ? clientWidth - parameters.left : 0, top: 0, bottom: 0 }
+        : { left: 0, right: 0, top: instruments?.bottom ?? 0, bottom: parameters ? clientHeight - parameters.top : 0 };
+  }
+
   /** Before each picture. */
   update(): void {
     const now = performance.now();
@@ -92,15 +102,14 @@ export class Camera {
     const { clientWidth, clientHeight } = this.canvas;
     this.eye.aspect = clientWidth / Math.max(1, clientHeight);
     // What there is to be seen beside the middle is to be in the picture, and not behind panels: a narrow one takes a wider angle.
-    const roomy = clientWidth > ROOMY;
-    const free = roomy ? 1 - Math.min(MOST, (this.coveredLeft + this.coveredRight) / clientWidth) : 1;
-    const high = Math.tan(THREE.MathUtils.degToRad(this.home?.fov ?? 35) / 2);
-    this.eye.fov = 2 * THREE.MathUtils.radToDeg(Math.atan(Math.max(high, this.wide / (this.eye.aspect * free))));
+    const { left, right, top, bottom } = this.covered;
+    const free = (pixels: number, all: number) => 1 - Math.min(MOST, pixels / Math.max(1, all));
+    const high = Math.tan(THREE.MathUtils.degToRad(this.home?.fov ?? 35) / 2) / free(BARS + top + bottom, clientHeight);
+    this.eye.fov = 2 * THREE.MathUtils.radToDeg(Math.atan(Math.max(high, this.wide / (this.eye.aspect * free(left + right, clientWidth)))));
     this.eye.near = this.distance / 200;
     this.eye.far = this.distance * 200;
-    // On a wide screen the middle of the picture is the middle of what panels leave free.
-    const aside = roomy ? (this.coveredRight - this.coveredLeft) / 2 : 0;
-    this.eye.setViewOffset(clientWidth, clientHeight, aside, LIFTED, clientWidth, clientHeight); // updates the projection
+    // The middle of the picture is the middle of what panels leave free.
+    this.eye.setViewOffset(clientWidth, clientHeight, (right - left) / 2, LIFTED + (bottom - top) / 2, clientWidth, clientHeight); // updates the projection
     this.eye.updateMatrixWorld();
   }
 }

@@ -158,8 +158,7 @@ function draw(): void {
   }
   parameters.update();
   timeline.update(newest);
-  camera.coveredRight = parameters.covers;
-  camera.coveredLeft = document.querySelector("#instruments > section:not([hidden]):not(#legend)") ? instruments.offsetLeft + instruments.offsetWidth : 0;
+  camera.behind(document.querySelector("#instruments > section:not([hidden]):not(#legend)") ? instruments.getBoundingClientRect() : null, parameters.box);
   camera.update();
   grab.update(newest);
   hand.update(newest);

@@ -50,9 +50,9 @@ export class Parameters {
     if (this.gui) this.gui.open(this.gui._closed);
   }
 
-  /** How much of the picture is behind them, at the right [pixels]. */
-  get covers(): number {
-    return this.gui && !this.gui._closed && !this.gui._hidden ? innerWidth - this.gui.domElement.offsetLeft : 0;
+  /** Where they are, if they are open. */
+  get box(): DOMRect | null {
+    return this.gui && !this.gui._closed && !this.gui._hidden ? this.gui.domElement.getBoundingClientRect() : null;
   }
 
   /** Once for each picture: what was turned meanwhile. */

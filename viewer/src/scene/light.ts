@@ -14,6 +14,7 @@ export const light = {
   toKey: { value: new THREE.Vector3(-0.45, 1.0, 0.55).normalize() },
   middle: { value: new THREE.Vector3() },
   pool: { value: 1 },
+  wider: { value: 1 }, // the pool, by the theme
   resolution: { value: new THREE.Vector2(1, 1) },
   shadowPass: { value: false },
   shadowMap: { value: null as THREE.Texture | null },
@@ -87,7 +88,7 @@ export class Shadow {
     const distance = eye.position.distanceTo(middle);
     const radius = POOL * distance * Math.tan(THREE.MathUtils.degToRad(eye.fov) / 2);
     light.middle.value.copy(middle);
-    light.pool.value = 1 / radius;
+    light.pool.value = 1 / (light.wider.value * radius);
     const reach = REACH * radius;
     const camera = this.camera;
     camera.left = camera.bottom = -reach;
@@ -119,4 +120,5 @@ export function setBackdrop(theme: Theme): void {
   light.bottom.value.setRGB(...theme.bottom);
   light.top.value.setRGB(...theme.top);
   light.ambient.value = theme.ambient;
+  light.wider.value = theme.pool;
 }
