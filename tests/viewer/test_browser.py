@@ -427,6 +427,25 @@ def test_keys_and_the_panel_do_what_they_say(opened):
     assert it.problems == []
 
 
+def test_keys_act_whatever_was_clicked_last_and_controls_keep_theirs(opened):
+    it = opened(SCENES["pendulum"](links=1))
+    page = it.page
+    it.until("() => pointmass.connection.received > 0")
+    page.locator("#shown button[title^='Velocities']").click()
+    page.keyboard.press(" ")
+    eventually(lambda: not it.session._playing)
+    assert it.session._instruments.message.shown == ["velocity"]  # the space was not the button's
+    page.keyboard.press("s")
+    page.locator(".lil-title", has_text="Forces").click()
+    box = page.locator(".lil-controller input[type=checkbox]").last
+    box.scroll_into_view_if_needed()  # when the folder is open
+    box.focus()
+    page.keyboard.press(" ")
+    eventually(lambda: False in it.live.setup.switches.values())
+    assert not it.session._playing
+    assert it.problems == []
+
+
 TIP_OF_WIND = """direction => {
     const { camera } = pointmass, canvas = document.getElementById("picture"), { eye } = camera;
     const base = eye.position.clone().set(-0.72, 0.4, 0.5).unproject(eye).sub(eye.position).normalize();

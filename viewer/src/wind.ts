@@ -9,6 +9,7 @@ import type { Theme } from "./theme";
 const UP = new THREE.Vector3(0, 1, 0);
 const AT = new THREE.Vector2(-0.72, 0.4); // where it stands in the picture, from -1 to 1
 const LENGTH = 60, HEAD = 20, WIDTH = 16, SHAFT = 3; // [pixels]
+const ROOM = 72; // at its left, at least [pixels]
 const REACH = 22; // from the tip [pixels]
 const TURN = Math.PI / 12; // of a key [rad]
 
@@ -109,6 +110,7 @@ export class Wind {
   }
 
   private base(): THREE.Vector3 {
-    return this.camera.sight(AT).at(this.camera.distance, new THREE.Vector3());
+    const at = AT.clone().setX(Math.max(AT.x, (2 * ROOM) / this.canvas.clientWidth - 1));
+    return this.camera.sight(at).at(this.camera.distance, new THREE.Vector3());
   }
 }
