@@ -211,7 +211,7 @@ def test_a_slider_changes_the_scene(opened):
 
 
 def test_a_narrow_page_shows_all_that_there_is_as_large_as_it_goes(opened):
-    camera = pm.Camera(position=(0, 0, 10), target=(0, 0, 0), fov=40)
+    camera = pm.Camera(position=(0, 0, 10), target=(0, 0, 0), fov=30)
     body = pm.body_of(pm.Particles([(-2, 0, 0), (2, 0, 0)], radius=0.05))
     it = opened(Live(Subject.of_scene(pm.Scene(bodies=[body], forces=[], camera=camera))))
     it.until("() => pointmass.connection.received > 0")

@@ -6,8 +6,7 @@ import type { View } from "./messages";
 
 export const ROOMY = 900; // a narrower picture has no room for parameters beside it [pixels]
 const NARROW = 700; // and one that is narrower has them above and below its middle, as style.css says [pixels]
-const LIFTED = 24; // [pixels]
-const BARS = 120; // at the top and the bottom, together [pixels]
+const ABOVE = 36, BELOW = 84; // what bars take of a wide picture's height [pixels]
 const MOST = 0.6; // of the picture's width, or height, that is left to panels and bars; what is behind more than that stays there
 const EASE = 4; // rate at which it comes to where it is led [1/s]
 
@@ -18,7 +17,7 @@ export class Camera {
   private readonly aim = new THREE.Vector3();
   private since = 0; // the last picture [ms]
   private wide = 0; // tangent of half the angle to the sides that is shown at least
-  private covered = { left: 0, right: 0, top: 0, bottom: 0 }; // by panels [pixels]
+  private covered = { left: 0, right: 0, top: ABOVE, bottom: BELOW }; // by panels and bars [pixels]
   private led = true; // until the user takes it
   private readonly caster = new THREE.Raycaster();
 
@@ -79,13 +78,13 @@ export class Camera {
     this.update();
   }
 
-  /** Panels that are open: beside the picture's middle, or, where there is no room, above and below it. */
-  behind(instruments: DOMRect | null, parameters: DOMRect | null): void {
+  /** What lies over the picture: beside its middle, or, where there is no room, above and below it. */
+  behind(instruments: DOMRect, opened: boolean, parameters: DOMRect | null): void {
     const { clientWidth, clientHeight } = this.canvas;
     this.covered =
       clientWidth >= NARROW
-        ? { left: instruments?.right ?? 0, right: parameters ? clientWidth - parameters.left : 0, top: 0, bottom: 0 }
-        : { left: 0, right: 0, top: instruments?.bottom ?? 0, bottom: parameters ? clientHeight - parameters.top : 0 };
+        ? { left: opened ? instruments.right : 0, right: parameters ? clientWidth - parameters.left : 0, top: ABOVE, bottom: BELOW }
+        : { left: 0, right: 0, top: instruments.bottom, bottom: parameters ? clientHeight - parameters.top : BELOW };
   }
 
   /** Before each picture. */
@@ -104,12 +103,12 @@ export class Camera {
     // What there is to be seen beside the middle is to be in the picture, and not behind panels: a narrow one takes a wider angle.
     const { left, right, top, bottom } = this.covered;
     const free = (pixels: number, all: number) => 1 - Math.min(MOST, pixels / Math.max(1, all));
-    const high = Math.tan(THREE.MathUtils.degToRad(this.home?.fov ?? 35) / 2) / free(BARS + top + bottom, clientHeight);
+    const high = Math.tan(THREE.MathUtils.degToRad(this.home?.fov ?? 35) / 2) / free(top + bottom, clientHeight);
     this.eye.fov = 2 * THREE.MathUtils.radToDeg(Math.atan(Math.max(high, this.wide / (this.eye.aspect * free(left + right, clientWidth)))));
     this.eye.near = this.distance / 200;
     this.eye.far = this.distance * 200;
     // The middle of the picture is the middle of what panels leave free.
-    this.eye.setViewOffset(clientWidth, clientHeight, (right - left) / 2, LIFTED + (bottom - top) / 2, clientWidth, clientHeight); // updates the projection
+    this.eye.setViewOffset(clientWidth, clientHeight, (right - left) / 2, (bottom - top) / 2, clientWidth, clientHeight); // updates the projection
     this.eye.updateMatrixWorld();
   }
 }

@@ -158,7 +158,8 @@ function draw(): void {
   }
   parameters.update();
   timeline.update(newest);
-  camera.behind(document.querySelector("#instruments > section:not([hidden]):not(#legend)") ? instruments.getBoundingClientRect() : null, parameters.box);
+  const opened = document.querySelector("#instruments > section:not([hidden]):not(#legend)") !== null;
+  camera.behind(instruments.getBoundingClientRect(), opened, parameters.box);
   camera.update();
   grab.update(newest);
   hand.update(newest);
