@@ -6,7 +6,7 @@ import type { View } from "./messages";
 
 export const ROOMY = 900; // a narrower picture has no room for parameters beside it [pixels]
 const NARROW = 700; // and one that is narrower has them above and below its middle, as style.css says [pixels]
-const ABOVE = 36, BELOW = 84; // what bars take of a wide picture's height [pixels]
+const ABOVE = 60, BELOW = 84; // what bars take of a wide picture's height [pixels]
 const MOST = 0.6; // of the picture's width, or height, that is left to panels and bars; what is behind more than that stays there
 const EASE = 4; // rate at which it comes to where it is led [1/s]
 
