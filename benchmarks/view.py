@@ -26,6 +26,7 @@ import pointmass as pm
 from pointmass.errors import InvalidInput
 from pointmass.viewer.pack import pack
 from pointmass.viewer.page import page_folder
+from pointmass.viewer.running import Running
 from pointmass.viewer.server import Server
 from pointmass.viewer.session import Session
 
@@ -35,29 +36,24 @@ KEPT = 4  # frames that are sent in turns
 FASTER = 1000.0  # frames per second that are asked for: more than there can be
 
 
-class Frames:
-    """A player whose frames are there already."""
+class Frames(Running):
+    """A player whose frames are there already, like those of a cache: of particles that fall."""
 
-    name, summary, solver = "frames", "", ""
-    dt, fps, frames, timeline = 0.0, FASTER, None, None
-    grabs, held, target = False, -1, (0.0, 0.0, 0.0)
-    parameters, presets, camera = (), (), pm.Camera()
+    sims = ()
 
-    def __init__(self, kept: list[pm.Frame]) -> None:
-        self._kept, self._next = kept, 0
+    def __init__(self, points: int) -> None:
+        system = pm.ParticleSystem(pm.scatter(points, size=(2, 2, 2)).particles, forces=[pm.Gravity()])
+        sim = pm.Simulation(system, dt=1 / 60)
+        super().__init__(sim, fps=FASTER)
+        self.kept = list(sim.frames(KEPT, 60))
+        self._next = 0
 
     def start(self) -> pm.Frame:
-        return self._kept[0]
+        return self.kept[0]
 
     def advance(self, speed: float) -> pm.Frame:
         self._next += 1
-        return self._kept[self._next % len(self._kept)]
-
-
-def frames_of(points: int) -> list[pm.Frame]:
-    """Some frames of particles that fall."""
-    system = pm.ParticleSystem(pm.scatter(points, size=(2, 2, 2)).particles, forces=[pm.Gravity()])
-    return list(pm.Simulation(system, dt=1 / 60).frames(KEPT, 60))
+        return self.kept[self._next % KEPT]
 
 
 async def receive(address: str, origin: str, seconds: float) -> tuple[int, float, int]:
@@ -87,7 +83,8 @@ def client(address: str, origin: str, seconds: float, answer: multiprocessing.Qu
 
 def data_path(points: int) -> tuple[float, float, float, float]:
     """Frames a second, megabytes of a frame, and milliseconds of this process for one, of which to pack it."""
-    kept = frames_of(points)
+    player = Frames(points)
+    kept = player.kept
     known = {d.name: d.version for d in kept[0].drawables}
     times = []
     for k in range(8):
@@ -95,7 +92,7 @@ def data_path(points: int) -> tuple[float, float, float, float]:
         pack(kept[1 + k % (KEPT - 1)], 1, known)
         times.append(1000 * (time.thread_time() - begun))
     with TemporaryDirectory() as folder:
-        session = Session(Frames(kept))
+        session = Session(player)
         server = Server(session, Path(folder))
         session.start()
         server.start()

@@ -210,6 +210,36 @@ def test_a_slider_changes_the_scene(opened):
     assert it.problems == []
 
 
+def test_a_narrow_page_shows_all_that_there_is_as_large_as_it_goes(opened):
+    camera = pm.Camera(position=(0, 0, 10), target=(0, 0, 0), fov=30)
+    body = pm.body_of(pm.Particles([(-2, 0, 0), (2, 0, 0)], radius=0.05))
+    it = opened(Live(Subject.of_scene(pm.Scene(bodies=[body], forces=[], camera=camera))))
+    it.until("() => pointmass.connection.received > 0")
+    it.page.set_viewport_size({"width": 390, "height": 780})
+    it.until("() => Math.abs(pointmass.camera.eye.aspect - 0.5) < 1e-6")
+    across = it.settled(1)[0] - it.settled(0)[0]
+    assert across == pytest.approx(390 / 1.12 * 4 / 4.1, abs=3)
+    assert it.problems == []
+
+
+def test_light_and_dark_show_the_same(opened, monkeypatch):
+    monkeypatch.setenv("POINTMASS_ENGINE", "reference")
+    it = opened(SCENES["cloth"](particles=8))
+    it.until("() => pointmass.connection.received > 0")
+    it.page.keyboard.press(" ")
+    eventually(lambda: not it.session._playing)
+    it.page.keyboard.press("d")
+    it.page.evaluate(THREE_PICTURES)
+    assert it.page.evaluate("() => document.documentElement.dataset.theme") == "light"
+    bent = it.page.evaluate(
+        """() => [...pointmass.registry.shown.values()].filter(({ part }) => part.kind === "triangles").map(
+            ({ drawable }) => drawable.object.material.uniforms.normals.value.image.data.some((n) => n !== 0))"""
+    )
+    assert bent
+    assert all(bent)  # a mesh without normals is black
+    assert it.problems == []
+
+
 LOOKS = ("cloth", "fireworks", "hair", "smoke")  # one of each kind: a mesh, glows, curves, smoke
 
 
@@ -397,11 +427,31 @@ def test_keys_and_the_panel_do_what_they_say(opened):
     assert it.problems == []
 
 
+def test_keys_act_whatever_was_clicked_last_and_controls_keep_theirs(opened):
+    it = opened(SCENES["pendulum"](links=1))
+    page = it.page
+    it.until("() => pointmass.connection.received > 0")
+    page.locator("#shown button[title^='Velocities']").click()
+    page.keyboard.press(" ")
+    eventually(lambda: not it.session._playing)
+    assert it.session._instruments.message.shown == ["velocity"]  # the space was not the button's
+    page.keyboard.press("s")
+    page.locator(".lil-title", has_text="Forces").click()
+    box = page.locator(".lil-controller input[type=checkbox]").last
+    box.scroll_into_view_if_needed()  # when the folder is open
+    box.focus()
+    page.keyboard.press(" ")
+    eventually(lambda: False in it.live.setup.switches.values())
+    assert not it.session._playing
+    assert it.problems == []
+
+
 TIP_OF_WIND = """direction => {
     const { camera } = pointmass, canvas = document.getElementById("picture"), { eye } = camera;
     const base = eye.position.clone().set(-0.72, 0.4, 0.5).unproject(eye).sub(eye.position).normalize();
     base.multiplyScalar(camera.distance).add(eye.position);
-    const tip = base.clone().set(...direction).normalize().multiplyScalar(0.07 * camera.distance).add(base);
+    const length = camera.pixels(60) * camera.distance;
+    const tip = base.clone().set(...direction).normalize().multiplyScalar(length).add(base);
     const pixels = (p) => [(p.x + 1) / 2 * canvas.clientWidth, (1 - p.y) / 2 * canvas.clientHeight];
     return [base, tip].map((p) => pixels(p.project(eye)));
 }"""

@@ -12,7 +12,7 @@ from pointmass.scenes import SCENES
 from pointmass.viewer.duel import Duel, distance, entries
 from pointmass.viewer.inputs import Hold, LetGo, Turn
 from pointmass.viewer.instruments import Instruments
-from pointmass.viewer.messages import Inspect, Lens
+from pointmass.viewer.messages import Inspect, Lens, Vectors
 from pointmass.viewer.subject import Subject
 
 
@@ -176,3 +176,14 @@ def test_instruments_look_at_all_of_them():
     for name, error in errors.items():
         assert rows.data[-1, 1 + columns.index(("error", name))] == pytest.approx(error)
     assert ("energy", "reference") in columns
+
+
+def test_forces_are_those_at_a_particles_own_place_wherever_it_is_shown():
+    duel = Duel(oscillator(k_s=9.0), entries("leapfrog,rk4"))
+    instruments, frame = Instruments(duel), run(duel, 3)
+    assert len({x for x, _, _ in frame.positions.tolist()}) == 3  # beside each other
+    assert instruments.take(Vectors(name="force", on=True), frame, -1)
+    shown, _ = instruments.look(frame, fresh=True)
+    vectors = next(d for d in shown.drawables if d.name == "force arrows").vectors
+    own = np.concatenate([sim.system.particles.x for sim in duel.sims])
+    np.testing.assert_allclose(vectors / vectors[0, 0], own / own[0, 0], atol=1e-6)

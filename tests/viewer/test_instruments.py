@@ -360,6 +360,30 @@ def test_arrows_are_along_velocities_and_forces():
     assert it.instruments.message.shown == ["force"]
 
 
+def test_contacts_are_where_particles_touch_with_what_they_press():
+    m, g, radius = 2.0, 9.81, 0.1
+    places = [(0, radius, 0), (1, 1, 0), (0, radius, -2 + radius)]  # on the floor, in the air, and in a corner
+    body = pm.body_of(pm.Particles(places, m=m, radius=radius))
+    walls = [pm.Plane(), pm.Plane((0, 0, -2), (0, 0, 1))]
+    scene = pm.Scene(bodies=[body], forces=[pm.Gravity((0, -g, 0))], colliders=walls)
+    live = Live(Subject.of_scene(scene))
+    instruments, frame = Instruments(live), live.start()
+    assert instruments.take(Vectors(name="contact", on=True), frame, -1)
+    shown, _ = instruments.look(frame, fresh=True)
+    arrows = next(d for d in shown.drawables if d.name == "contact arrows")
+    np.testing.assert_allclose(arrows.vertices, [(0, 0, 0), (0, 0, -2 + radius), (0, radius, -2)], atol=1e-6)
+    factor = arrows.vectors[0, 1] / (m * g)
+    assert factor > 0
+    np.testing.assert_allclose(arrows.vectors, factor * m * g * np.array([(0, 1, 0), (0, 1, 0), (0, 0, 0)]), atol=1e-6)
+    dots = next(d for d in shown.drawables if d.name == "contacts")
+    np.testing.assert_array_equal(dots.vertices, arrows.vertices)
+
+
+def test_contacts_are_shown_where_there_are_surfaces():
+    assert "contact" in [c.name for c in Looked("bounce", balls=3).instruments.message.vectors]
+    assert "contact" not in [c.name for c in Looked("pendulum").instruments.message.vectors]
+
+
 def test_instruments_change_no_bit_of_a_run():
     plain, watched = Looked("springs", side=3), Looked("springs", side=3)
     for message in (Lens(name="limit"), Vectors(name="force", on=True), Plot(text="max(force)", on=True)):

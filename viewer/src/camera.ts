@@ -4,9 +4,10 @@ import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { View } from "./messages";
 
-const FITTED = 16 / 9;
 export const ROOMY = 900; // a narrower picture has no room for parameters beside it [pixels]
-const ASIDE = 120, LIFTED = 24; // [pixels]
+const NARROW = 700; // and one that is narrower has them above and below its middle, as style.css says [pixels]
+const ABOVE = 60, BELOW = 84; // what bars take of a wide picture's height [pixels]
+const MOST = 0.6; // of the picture's width, or height, that is left to panels and bars; what is behind more than that stays there
 const EASE = 4; // rate at which it comes to where it is led [1/s]
 
 export class Camera {
@@ -15,7 +16,8 @@ export class Camera {
   private home: View | null = null;
   private readonly aim = new THREE.Vector3();
   private since = 0; // the last picture [ms]
-  covered = 0; // by instruments on the left [pixels]
+  private wide = 0; // tangent of half the angle to the sides that is shown at least
+  private covered = { left: 0, right: 0, top: ABOVE, bottom: BELOW }; // by panels and bars [pixels]
   private led = true; // until the user takes it
   private readonly caster = new THREE.Raycaster();
 
@@ -71,8 +73,18 @@ export class Camera {
     this.eye.up.set(...this.home.up);
     this.eye.position.set(...this.home.position);
     this.orbit.target.set(...this.home.target);
+    this.wide = this.home.wide;
     this.orbit.update();
     this.update();
+  }
+
+  /** What lies over the picture: beside its middle, or, where there is no room, above and below it. */
+  behind(instruments: DOMRect, opened: boolean, parameters: DOMRect | null): void {
+    const { clientWidth, clientHeight } = this.canvas;
+    this.covered =
+      clientWidth >= NARROW
+        ? { left: opened ? instruments.right : 0, right: parameters ? clientWidth - parameters.left : 0, top: ABOVE, bottom: BELOW }
+        : { left: 0, right: 0, top: instruments.bottom, bottom: parameters ? clientHeight - parameters.top : BELOW };
   }
 
   /** Before each picture. */
@@ -82,22 +94,21 @@ export class Camera {
       const part = 1 - Math.exp((-EASE * (now - this.since)) / 1000);
       this.eye.position.lerp(this.aim.set(...this.home.position), part);
       this.orbit.target.lerp(this.aim.set(...this.home.target), part);
+      this.wide += part * (this.home.wide - this.wide);
     }
     this.since = now;
     this.orbit.update();
     const { clientWidth, clientHeight } = this.canvas;
     this.eye.aspect = clientWidth / Math.max(1, clientHeight);
-    const fov = this.home?.fov ?? 35;
-    // The place was found for a picture of 16 to 9: what that shows to the sides, a narrower one shows by a wider angle.
-    // So does one whose middle is not that of the page: nothing is to be beyond its edge.
-    const free = clientWidth > ROOMY ? 1 - Math.max(2 * ASIDE, this.covered) / clientWidth : 1;
-    const narrow = Math.max(1, FITTED / (this.eye.aspect * free));
-    this.eye.fov = 2 * THREE.MathUtils.radToDeg(Math.atan(Math.tan(THREE.MathUtils.degToRad(fov) / 2) * narrow));
+    // What there is to be seen beside the middle is to be in the picture, and not behind panels: a narrow one takes a wider angle.
+    const { left, right, top, bottom } = this.covered;
+    const free = (pixels: number, all: number) => 1 - Math.min(MOST, pixels / Math.max(1, all));
+    const high = Math.tan(THREE.MathUtils.degToRad(this.home?.fov ?? 35) / 2) / free(top + bottom, clientHeight);
+    this.eye.fov = 2 * THREE.MathUtils.radToDeg(Math.atan(Math.max(high, this.wide / (this.eye.aspect * free(left + right, clientWidth)))));
     this.eye.near = this.distance / 200;
     this.eye.far = this.distance * 200;
-    // On a wide screen the middle of the picture is the middle of what the parameters leave free.
-    const aside = clientWidth > ROOMY ? ASIDE - 0.4 * this.covered : 0;
-    this.eye.setViewOffset(clientWidth, clientHeight, aside, LIFTED, clientWidth, clientHeight); // updates the projection
+    // The middle of the picture is the middle of what panels leave free.
+    this.eye.setViewOffset(clientWidth, clientHeight, (right - left) / 2, (bottom - top) / 2, clientWidth, clientHeight); // updates the projection
     this.eye.updateMatrixWorld();
   }
 }

@@ -4,6 +4,7 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 
 const HEIGHT = 104;
+const WIDTH = Math.min(312, innerWidth - 48); // of all charts [pixels]
 const LINES: { color: string; dash: number[] }[] = [
   { color: "--line-1", dash: [] },
   { color: "--line-2", dash: [7, 4] },
@@ -56,6 +57,20 @@ function decades(_: uPlot, _axis: number, low: number, high: number): number[] {
 
 const FRAME = { legend: { show: false }, cursor: { show: false }, padding: [8, 8, 0, 0] as uPlot.Padding };
 
+/** Of the lines that go on: one that has ended, such as that of a solver that blew up, would leave no room for them. */
+function extent(lines: Line[]): [number, number] {
+  const going = lines.filter(({ values }) => values.at(-1) !== null);
+  let low = Infinity, high = -Infinity;
+  for (const { values } of going.length ? going : lines) {
+    for (const value of values) {
+      if (value === null) continue;
+      low = Math.min(low, value);
+      high = Math.max(high, value);
+    }
+  }
+  return low <= high ? [low, high] : [0, 1];
+}
+
 /** Lines over time under a head with their names, and their values now. */
 export class TimeChart {
   readonly element = document.createElement("figure");
@@ -63,8 +78,9 @@ export class TimeChart {
   private readonly chart: uPlot;
   private readonly figures: HTMLElement[] = [];
   private readonly names: string;
+  private range: [number, number] = [0, 1];
 
-  constructor(title: string, unit: string, lines: Line[], width: number, private readonly log: boolean, drop?: () => void) {
+  constructor(title: string, unit: string, lines: Line[], private readonly log: boolean, drop?: () => void) {
     this.names = named(lines);
     const name = document.createElement("b");
     name.textContent = title;
@@ -90,9 +106,9 @@ export class TimeChart {
     this.chart = new uPlot(
       {
         ...FRAME,
-        width,
+        width: WIDTH,
         height: HEIGHT,
-        scales: { x: { time: false }, y: log ? { distr: 3 } : {} },
+        scales: { x: { time: false }, y: log ? { distr: 3 } : { range: () => uPlot.rangeNum(...this.range, 0.1, true) } },
         axes: [axis(), { ...axis(), size: 44, space: 26, ...(log && { splits: decades, filter: (_, splits) => splits }) }],
         series: [
           {},
@@ -116,6 +132,7 @@ export class TimeChart {
 
   show(times: number[], lines: Line[]): void {
     const drawn = (values: Line["values"]) => (this.log ? values.map((value) => (value !== null && value > 0 ? value : null)) : values);
+    this.range = extent(lines);
     this.chart.setData([times, ...lines.map((line) => drawn(line.values))]);
     lines.forEach((line, k) => (this.figures[k].textContent = short(line.values.at(-1))));
   }
@@ -130,7 +147,7 @@ export class TimeChart {
 export class PhaseChart {
   private readonly chart: uPlot;
 
-  constructor(element: HTMLElement, width: number) {
+  constructor(element: HTMLElement) {
     const draw = (plot: uPlot, index: number) => {
       uPlot.orient(plot, index, (_series, xs, ys, scaleX, scaleY, toX, toY, left, top, wide, high) => {
         const pen = plot.ctx, many = xs.length;
@@ -160,7 +177,7 @@ export class PhaseChart {
       {
         ...FRAME,
         mode: 2,
-        width,
+        width: WIDTH,
         height: 190,
         scales: { x: { time: false, range: padded }, y: { range: padded } },
         axes: [axis(), { ...axis(), size: 44, space: 30 }],

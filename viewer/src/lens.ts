@@ -9,6 +9,7 @@ import type { Instruments, Legend } from "./messages";
 const SHAPES: Record<string, string> = {
   plots: "M4 4v16h16M8 15l4-5 3 3 5-7",
   velocity: "M4 20 19 5M10 5h9v9",
+  contact: "M3 19h18M12 19V6M7 11l5-5 5 5",
   force: "M4 12h14M13 6l6 6-6 6M4 7v10",
   field: "M3 7h7M7 4l3 3-3 3M13 7h8M18 4l3 3-3 3M3 17h7M7 14l3 3-3 3M13 17h8M18 14l3 3-3 3",
   streamlines: "M3 8c5-5 9 5 18 0M3 16c5-5 9 5 18 0",
@@ -16,7 +17,7 @@ const SHAPES: Record<string, string> = {
   duel: "M4 5h7v14H4zM14 5h7v14h-7z",
 };
 
-const ARROWS = ["velocity", "force", "field", "streamlines"];
+const ARROWS = ["velocity", "force", "contact", "field", "streamlines"];
 
 export class Lens {
   private instruments: Instruments | null = null;
@@ -36,6 +37,7 @@ export class Lens {
     bar.append(this.choice);
     this.button("velocity", "Velocities (V)", () => this.arrows("velocity"));
     this.button("force", "Forces (K)", () => this.arrows("force"));
+    this.button("contact", "Contacts (Q)", () => this.arrows("contact"));
     this.button("field", "Arrows of the field (U)", () => this.arrows("field"));
     this.button("streamlines", "Streamlines (H)", () => this.arrows("streamlines"));
     this.button("curves", "Integral curves (Y)", () => this.curves.toggle());
@@ -47,7 +49,7 @@ export class Lens {
     this.instruments = instruments;
     this.bar.hidden = false;
     this.choice.replaceChildren(
-      new Option("colours of the scene", ""),
+      new Option("scene's own", ""),
       ...instruments.lenses.map(({ name, title }) => new Option(title, name)),
     );
     this.choice.value = instruments.lens;

@@ -35,7 +35,7 @@ const camera = new Camera(canvas);
 const picture = new Picture(canvas);
 let theme = firstTheme();
 const registry = new Registry(theme);
-const wind = new Wind(canvas, camera, connection); // hears of a press before the grab does
+const wind = new Wind(find("wind"), canvas, camera, connection); // hears of a press before the grab does
 const grab = new Grab(canvas, camera, registry.places, connection);
 const hand = new Hand(canvas, camera, registry.places, grab, connection);
 const plots = new Plots(find("plots"), connection);
@@ -51,6 +51,7 @@ function dress(): void {
   document.documentElement.dataset.theme = theme.name;
   setBackdrop(theme);
   registry.dress(theme);
+  wind.dress(theme);
   plots.dress();
   pick.dress();
 }
@@ -107,6 +108,7 @@ const keys = new Keys(find<HTMLDialogElement>("help"), [
   { key: "e", shown: "E", does: "the next lens", action: () => lens.next() },
   { key: "v", shown: "V", does: "velocities", action: () => lens.arrows("velocity") },
   { key: "k", shown: "K", does: "forces", action: () => lens.arrows("force") },
+  { key: "q", shown: "Q", does: "contacts with surfaces", action: () => lens.arrows("contact") },
   { key: "u", shown: "U", does: "arrows of the field", action: () => lens.arrows("field") },
   { key: "h", shown: "H", does: "streamlines", action: () => lens.arrows("streamlines") },
   { key: "y", shown: "Y", does: "integral curves: click where they start", action: () => curves.toggle() },
@@ -156,7 +158,8 @@ function draw(): void {
   }
   parameters.update();
   timeline.update(newest);
-  camera.covered = document.querySelector("#instruments > section:not([hidden]):not(#legend)") ? instruments.offsetLeft + instruments.offsetWidth : 0;
+  const opened = document.querySelector("#instruments > section:not([hidden]):not(#legend)") !== null;
+  camera.behind(instruments.getBoundingClientRect(), opened, parameters.box);
   camera.update();
   grab.update(newest);
   hand.update(newest);

@@ -239,13 +239,14 @@ export interface Switch {
   on: boolean;
 }
 
-/** Where the camera stands until the user moves it [m], and its vertical angle of view [degrees]. */
+/** Where the camera stands until the user moves it [m], its vertical angle of view [degrees], and the tangent of */
 export interface View {
   kind: "view";
   position: Vector;
   target: Vector;
   up: Vector;
   fov: number;
+  wide: number;
 }
 
 /** What is looked at; the first message, and again when parameters were changed by somebody. */

@@ -50,6 +50,11 @@ export class Parameters {
     if (this.gui) this.gui.open(this.gui._closed);
   }
 
+  /** Where they are, if they are open. */
+  get box(): DOMRect | null {
+    return this.gui && !this.gui._closed && !this.gui._hidden ? this.gui.domElement.getBoundingClientRect() : null;
+  }
+
   /** Once for each picture: what was turned meanwhile. */
   update(): void {
     for (const [name, value] of this.waiting) this.connection.send({ kind: "change", name, value });

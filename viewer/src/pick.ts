@@ -15,7 +15,6 @@ import { Track } from "./track";
 const STILL = 5; // a press that moves no more is a click [pixels]
 const BRIEF = 400; // and one that takes no longer [ms]
 const EVERY = 60; // [ms]
-const WIDTH = 284;
 const AXES = ["x", "y", "z"];
 
 export class Pick {
@@ -43,7 +42,7 @@ export class Pick {
     this.axis.addEventListener("change", () => this.draw());
     addHead(card, "picked particle", "Pick nobody", () => connection.send({ kind: "dismiss" }));
     card.append(this.figures, this.axis);
-    this.phase = new PhaseChart(card, WIDTH);
+    this.phase = new PhaseChart(card);
     // Before the canvas hears of it, where a grab ends what others hear.
     addEventListener("pointerdown", (event) => this.press(event), { capture: true });
     addEventListener("pointerup", (event) => this.release(event), { capture: true });

@@ -7,7 +7,6 @@ import type { Instruments } from "./messages";
 import { Track } from "./track";
 
 const EVERY = 100; // [ms]
-const WIDTH = 284;
 
 export class Plots {
   readonly track = new Track();
@@ -87,7 +86,7 @@ export class Plots {
         const own = this.expressions.includes(plot);
         const drop = own ? () => this.connection.send({ kind: "plot", text: plot, on: false }) : undefined;
         const old = chart?.element;
-        chart = new TimeChart(plot, first.unit, lines, WIDTH, first.log, drop);
+        chart = new TimeChart(plot, first.unit, lines, first.log, drop);
         if (old) old.replaceWith(chart.element);
         else if (own) this.list.prepend(chart.element);
         else this.list.append(chart.element);

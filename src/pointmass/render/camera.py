@@ -132,7 +132,11 @@ def fit_camera(frames: Iterable[Frame], camera: Camera | None = None, size: tupl
         return replace(camera, position=_triple(place[1:4]), target=_triple(place[4:]))
     if camera.position is not None and camera.target is not None:
         return camera
-    spots = _interesting(frames)
+    return placed(interesting(frames), camera, size)
+
+
+def placed(spots: Vector, camera: Camera, size: tuple[int, int] = (1280, 720)) -> Camera:
+    """The same for balls that must be in the picture; they are those of `interesting`."""
     balls, radii = spots[:, :3], spots[:, 3]
     low, high = balls.min(axis=0), balls.max(axis=0)
     size_of_all = float(np.linalg.norm(high - low))
@@ -156,6 +160,15 @@ def fit_camera(frames: Iterable[Frame], camera: Camera | None = None, size: tupl
     # Aim at the middle of the scene's depth on the optical axis.
     target = middle + place[0] * axes[0] + place[1] * axes[1]
     return replace(camera, position=_triple(target + place[2] * axes[2]), target=_triple(target))
+
+
+def breadth(spots: Vector, camera: Camera) -> float:
+    """Tangent of half the angle to the sides that holds what must be in the picture, of a camera that stands."""
+    view = look(camera, (1, 1))
+    seen = view.see(spots[:, :3])
+    ahead = seen[:, 2] > view.near
+    sides = (np.abs(seen[ahead, 0]) + spots[ahead, 3]) / seen[ahead, 2]
+    return MARGIN * float(sides.max(initial=0.0))
 
 
 def _axes(forward: Vector, up: tuple[float, float, float]) -> Vector:
@@ -218,7 +231,7 @@ def _distance(seen: Vector, radii: Vector, slopes: tuple[float, float]) -> float
     return max(*need, 1e-9)
 
 
-def _interesting(frames: Iterable[Frame]) -> Vector:
+def interesting(frames: Iterable[Frame]) -> Vector:
     """Balls (x, y, z, radius) that the picture must show, shape (n, 4) with n >= 1."""
     spots: list[Vector] = []
     static: dict[str, Vector] = {}

@@ -118,7 +118,10 @@ class JellyScene(ShippedScene):
             forces=[Gravity((0.0, -self.gravity, 0.0))],
             colliders=[Plane(restitution=0.0, friction=self.friction)],
             camera=Camera(
-                position=(0.15 * width, 0.45 * width, 1.2 * width), target=(0.0, 0.7 * self.size, 0.0), fov=28.0
+                # Those that are tilted to the right roll to the right.
+                position=(0.27 * width, 0.5 * width, 1.45 * width),
+                target=(0.12 * width, 0.7 * self.size, 0.0),
+                fov=28.0,
             ),
             look=Look(groups=looks, collider_color="#d9d3c7"),
         )

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.frame import Frame
-from pointmass.particles import BUILT_IN
+from pointmass.particles import BUILT_IN, Array
 from pointmass.simulation import Simulation
+from pointmass.system import ParticleSystem
+from pointmass.viewer.contacts import contacts
 from pointmass.viewer.residual import residual, solves
 
 Numbers = NDArray[np.floating[Any]]
@@ -43,19 +45,39 @@ class Columns:
     def forces(self) -> Numbers:
         """All forces on each particle [N], shape (n, 3)."""
         if self._forces is None:
-            parts, begin = [], 0
-            for sim in self._sims:
-                system, end = sim.system, begin + len(sim.system.particles)
-                x, v = (
-                    a[begin:end].astype(system.particles.dtype) for a in (self.frame.positions, self.frame.velocities)
-                )
+            parts = []
+            for system, x, v, t in self._states():
                 system.clear_forces()
                 with np.errstate(all="ignore"):
-                    system.calculate_forces(self.frame.time, x, v)
+                    system.calculate_forces(t, x, v)
                 parts.append(system.particles.f.astype(np.float64))
-                begin = end
             self._forces = np.concatenate(parts) if parts else np.zeros((0, 3))
         return self._forces
+
+    @property
+    def contacts(self) -> tuple[NDArray[np.intp], Numbers]:
+        """Rows of particles that touch surfaces, and the normals of these, as `contacts` says."""
+        rows, normals, begin = [np.zeros(0, np.intp)], [np.zeros((0, 3))], 0
+        for system, x, _, t in self._states():
+            touching, normal = contacts(system, x, t)
+            rows.append(touching + begin)
+            normals.append(normal)
+            begin += len(x)
+        return np.concatenate(rows), np.concatenate(normals)
+
+    def _states(self) -> Iterator[tuple[ParticleSystem, Array, Array, float]]:
+        """Each system, places and velocities of its particles, and the time.
+
+        They are those of the frame, which may lie between two steps. Where several systems are shown, beside each
+        other, places in the frame are not their own: they are those of the last step.
+        """
+        for sim in self._sims:
+            p = sim.system.particles
+            if len(self._sims) > 1:
+                yield sim.system, p.x.copy(), p.v.copy(), sim.t
+            else:
+                x, v = (a.astype(p.dtype) for a in (self.frame.positions, self.frame.velocities))
+                yield sim.system, x, v, self.frame.time
 
     def names(self) -> list[str]:
         """All that there are."""

@@ -365,13 +365,15 @@ class Switch:
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """Where the camera stands until the user moves it [m], and its vertical angle of view [degrees]."""
+    """Where the camera stands until the user moves it [m], its vertical angle of view [degrees], and the tangent of
+    half the angle to the sides in which there is something to be seen: a narrow page shows that."""
 
     kind: ClassVar[str] = "view"
     position: Vector
     target: Vector
     up: Vector
     fov: float
+    wide: float
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from pointmass.engine.island import Span
 from pointmass.errors import Diverged
 from pointmass.simulation import Simulation
-
-TOUCHING = 1e-6  # of a particle's size and of the scene's, from a surface
+from pointmass.viewer.contacts import contacts
 
 
 def solves(sims: Sequence[Simulation]) -> bool:
@@ -36,22 +35,14 @@ def residual(sim: Simulation) -> NDArray[np.floating[Any]]:
                 engine.reference.step(t, t + sim.dt)
             elif not engine.run(Span(t, sim.dt, 0, 1), None, look_inside=False):
                 return np.full(len(p), np.nan)
-            y1, touching = system.get_state(), _touching(sim, t + sim.dt)
+            y1, touching = system.get_state(), contacts(system, p.x, t + sim.dt)[0]
     except Diverged:
         return np.full(len(p), np.nan)
     with np.errstate(all="ignore"):
         found = sim.solver.residual(system, t, y, sim.dt, memory, y1)
     if found is None:
         return np.full(len(p), np.nan)
-    length = np.linalg.norm(found.reshape(-1, 3).astype(np.float64), axis=1)
-    return np.where(touching, np.nan, np.where(p.pinned, 0.0, length))
-
-
-def _touching(sim: Simulation, t: float) -> NDArray[np.bool_]:
-    """Who touches a surface at a time, shape (n,)."""
-    p = sim.system.particles
-    near = p.radius * (1 + TOUCHING) + TOUCHING * float(np.ptp(p.x, axis=0).max(initial=0.0) if len(p) else 0.0)
-    result = np.zeros(len(p), bool)
-    for collider in sim.system.colliders:
-        result |= collider.distance(p.x, t) <= near
-    return result
+    length: NDArray[np.floating[Any]] = np.linalg.norm(found.reshape(-1, 3).astype(np.float64), axis=1)
+    length[p.pinned] = 0.0
+    length[touching] = np.nan
+    return length

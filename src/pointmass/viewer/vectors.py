@@ -1,4 +1,4 @@
-"""Arrows at particles: their velocities, and the forces on them."""
+"""Arrows at particles: their velocities, the forces on them, and how hard they press on what they touch."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from pointmass.colors import linear
 from pointmass.errors import unknown
-from pointmass.frame import Arrows, Frame
+from pointmass.frame import Arrows, Drawable, Frame, Points
 from pointmass.simulation import Simulation
 from pointmass.viewer import shading
 from pointmass.viewer.columns import Columns, Numbers, length
@@ -21,7 +21,9 @@ FALL = 0.99  # of the scale from frame to frame, so that arrows do not jump
 KINDS = {
     "velocity": (Choice(name="velocity", title="velocities", unit="m/s"), linear("#7cc4ff", 1.2)),
     "force": (Choice(name="force", title="forces", unit="N"), linear("#ffa23a", 1.2)),
+    "contact": (Choice(name="contact", title="contacts", unit="N"), linear("#f070b8", 1.2)),
 }
+DOT = 0.8  # radius where a particle touches, over the width of an arrow
 
 
 class Vectors:
@@ -50,14 +52,23 @@ class Vectors:
         self.shown = [each for each in offered if (on if each == name else each in self.shown)]
         self._scale.pop(name, None)
 
-    def arrows(self, frame: Frame, columns: Columns, version: int) -> list[Arrows]:
+    def arrows(self, frame: Frame, columns: Columns, version: int) -> list[Drawable]:
         """What is on."""
-        return [self._drawn(name, frame, columns, version) for name in self.shown]
+        drawn: list[Drawable] = []
+        for name in self.shown:
+            tails, vectors = _contacts(frame, columns) if name == "contact" else _all(name, frame, columns)
+            step = max(1, -(-len(tails) // MOST))
+            arrows = self._drawn(name, frame, tails[::step].astype(np.float32), vectors[::step], version)
+            drawn.append(arrows)
+            if name == "contact":  # also who presses with no force is seen to touch
+                dot = DOT * float(np.max(arrows.width))
+                drawn.append(
+                    Points(name="contacts", version=version, vertices=arrows.vertices, radius=dot, color=arrows.color)
+                )
+        return drawn
 
-    def _drawn(self, name: str, frame: Frame, columns: Columns, version: int) -> Arrows:
-        step = max(1, -(-len(frame.positions) // MOST))
-        vectors = (frame.velocities if name == "velocity" else columns.forces)[::step].astype(np.float64)
-        size, tails = shading.extent(frame.positions), frame.positions[::step].astype(np.float32)
+    def _drawn(self, name: str, frame: Frame, tails: Numbers, vectors: Numbers, version: int) -> Arrows:
+        size = shading.extent(frame.positions)
         scale = self._typical(name, vectors)
         factor = LONG * size / scale if scale > 0 else 0.0
         return Arrows(
@@ -80,4 +91,17 @@ class Vectors:
 def choices(sims: Sequence[Simulation]) -> list[Choice]:
     """The arrows that there are."""
     forces = bool(sims) and sims[0].system.order == 2
-    return [KINDS[name][0] for name in ("velocity", *(["force"] if forces else []))]
+    touch = forces and any(sim.system.colliders for sim in sims)
+    return [KINDS[name][0] for name in ("velocity", *(["force"] if forces else []), *(["contact"] if touch else []))]
+
+
+def _all(name: str, frame: Frame, columns: Columns) -> tuple[Numbers, Numbers]:
+    return frame.positions, (frame.velocities if name == "velocity" else columns.forces).astype(np.float64)
+
+
+def _contacts(frame: Frame, columns: Columns) -> tuple[Numbers, Numbers]:
+    """Where particles touch surfaces, and the force with which the surface bears the others that press them into it."""
+    rows, normals = columns.contacts
+    pressing = np.einsum("ij,ij->i", columns.forces[rows], normals)
+    radius = np.asarray(columns["radius"])[rows]
+    return frame.positions[rows] - radius[:, None] * normals, np.maximum(-pressing, 0.0)[:, None] * normals

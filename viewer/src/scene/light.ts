@@ -14,6 +14,7 @@ export const light = {
   toKey: { value: new THREE.Vector3(-0.45, 1.0, 0.55).normalize() },
   middle: { value: new THREE.Vector3() },
   pool: { value: 1 },
+  wider: { value: 1 }, // the pool, by the theme
   resolution: { value: new THREE.Vector2(1, 1) },
   shadowPass: { value: false },
   shadowMap: { value: null as THREE.Texture | null },
@@ -22,7 +23,7 @@ export const light = {
   softness: { value: 2 }, // of the shadow's edge [texels]
 };
 
-/** For fragment shaders: `lit(albedo, normal, place, gloss)` and `backdrop()`. */
+/** For fragment shaders: `lit(albedo, normal, place, gloss)`, `ink(glow, strength)` and `backdrop()`. */
 export const LIGHT = /* glsl */ `
 uniform vec3 bottom, top, toKey, middle;
 uniform float ambient, pool, texel;
@@ -34,6 +35,14 @@ uniform mat4 toShadow;
 out highp vec4 result;
 
 vec3 backdrop() { return mix(bottom, top, gl_FragCoord.y / resolution.y); }
+
+/** A glow on a bright backdrop, which light cannot be seen on: laid over it, dark enough to be told from it; faint light is a thin layer. */
+vec4 ink(vec3 glow, float strength) {
+  float peak = max(max(glow.r, glow.g), max(glow.b, 1e-6));
+  vec3 color = glow / peak;
+  color *= min(1.0, 0.4 / dot(color, vec3(0.2126, 0.7152, 0.0722)));
+  return vec4(color, 1.0) * min(1.0, 1.5 * strength * min(1.0, peak));
+}
 
 float unshadowed(vec3 place, vec3 normal) {
   vec4 at = toShadow * vec4(place + normal * texel * 3.0, 1.0);
@@ -79,7 +88,7 @@ export class Shadow {
     const distance = eye.position.distanceTo(middle);
     const radius = POOL * distance * Math.tan(THREE.MathUtils.degToRad(eye.fov) / 2);
     light.middle.value.copy(middle);
-    light.pool.value = 1 / radius;
+    light.pool.value = 1 / (light.wider.value * radius);
     const reach = REACH * radius;
     const camera = this.camera;
     camera.left = camera.bottom = -reach;
@@ -111,4 +120,5 @@ export function setBackdrop(theme: Theme): void {
   light.bottom.value.setRGB(...theme.bottom);
   light.top.value.setRGB(...theme.top);
   light.ambient.value = theme.ambient;
+  light.wider.value = theme.pool;
 }

@@ -1,4 +1,5 @@
-// Segments and curves: capsules in the picture, of their own width, shaded like round rods; thinner than a pixel they fade.
+// Segments and curves: capsules in the picture, of their own width, shaded like round rods; thinner than a pixel they fade. Pieces of a
+// curve end where they meet, along the line that halves their angle: nothing gapes, and no light adds up.
 
 import * as THREE from "three";
 import type { Frame } from "../frame";
@@ -10,12 +11,18 @@ import type { Drawable } from "./drawable";
 import { LIGHT, light } from "./light";
 import { PLACE, Places } from "./places";
 
+const REACH = 2.2; // a glowing line ends at this many radii, as in the offline renderer (render/capsules.py)
+const THINNEST = 1.2, THINNEST_GLOW = 2.6; // [pixels]
+
 const VERTEX = /* glsl */ `
 ${PLACE}
 ${COLOR}
 uniform float oneWidth;
 uniform vec2 resolution;
 in uint rowA, rowB;
+#ifdef CHAINED
+in uint rowBefore, rowAfter;
+#endif
 #ifdef COLORS
 in vec4 colorA, colorB;
 #endif
@@ -24,10 +31,29 @@ in float widthA, widthB;
 #endif
 out vec4 tone;
 out vec3 spot, along;
+out vec2 past; // both ends, where they are round [half widths]
 out float across, pixels;
 
+bool breaks(uint row) { return (row & 0x80000000u) != 0u; }
+vec4 seen(uint row) { return projectionMatrix * viewMatrix * vec4(place(row & 0x7fffffffu), 1.0); }
+vec2 way(vec4 from, vec4 to) {
+  vec2 step = (to.xy / to.w - from.xy / from.w) * resolution;
+  float size = length(step);
+  return from.w > 0.0 && to.w > 0.0 && size > 1e-6 ? step / size : vec2(0.0);
+}
+/** Along the curve where two pieces meet; 0 where they do not, or turn back sharply. */
+vec2 joint(vec2 before, vec2 after) {
+  return dot(before, before) * dot(after, after) > 0.0 && dot(before, after) > -0.5 ? normalize(before + after) : vec2(0.0);
+}
+
 void main() {
-  if ((rowA & 0x80000000u) != 0u) { gl_Position = vec4(0.0, 0.0, 2.0, 1.0); return; }
+  vec4 pa = seen(rowA), pb = seen(rowB);
+  if (breaks(rowA) || pa.w <= 0.0 || pb.w <= 0.0) { gl_Position = vec4(0.0, 0.0, 2.0, 1.0); return; }
+  float size = length((pb.xy / pb.w - pa.xy / pa.w) * resolution);
+#ifdef CHAINED
+  // A particle at rest leaves a trail without length: it would be as bright as all its pieces.
+  if (size < 1e-4) { gl_Position = vec4(0.0, 0.0, 2.0, 1.0); return; }
+#endif
   vec3 a = place(rowA), b = place(rowB & 0x7fffffffu);
   bool end = position.x > 0.5;
   spot = end ? b : a;
@@ -42,23 +68,31 @@ void main() {
 #else
   float width = oneWidth;
 #endif
-  mat4 seen = projectionMatrix * viewMatrix;
-  vec4 pa = seen * vec4(a, 1.0), pb = seen * vec4(b, 1.0);
   vec4 at = end ? pb : pa;
-  vec2 way = pb.xy / pb.w * resolution - pa.xy / pa.w * resolution;
-  float length2 = length(way);
-  way = length2 > 1e-6 ? way / length2 : vec2(1.0, 0.0);
-  float full = width * 0.5 * resolution.y * projectionMatrix[1][1] / at.w;
-  pixels = max(full, 1.2);
-  tone.a *= min(1.0, full / pixels);
-  across = position.y * (pixels + 1.0) / pixels;
-#ifdef GLOWING
-  float over = 0.0; // light would add up where two lines meet
-#else
-  float over = end ? 0.3 : -0.3;
+  vec2 straight = size > 1e-6 ? way(pa, pb) : vec2(1.0, 0.0);
+  vec2 jointA = vec2(0.0), jointB = vec2(0.0);
+#ifdef CHAINED
+  if (!breaks(rowBefore)) jointA = joint(way(seen(rowBefore), pa), straight);
+  if (!breaks(rowB)) jointB = joint(straight, way(pb, seen(rowAfter)));
 #endif
-  vec2 off = (vec2(-way.y, way.x) * position.y + way * over) * (pixels + 1.0);
-  gl_Position = pa.w > 0.0 && pb.w > 0.0 ? at + vec4(off / resolution * at.w, 0.0, 0.0) : vec4(0.0, 0.0, 2.0, 1.0);
+  float full = width * 0.5 * resolution.y * projectionMatrix[1][1] / at.w;
+#ifdef GLOWING
+  full *= ${REACH};
+  pixels = max(full, ${THINNEST_GLOW});
+  float reach = pixels;
+#else
+  pixels = max(full, ${THINNEST});
+  float reach = pixels + 1.0;
+#endif
+  tone.a *= min(1.0, full / pixels);
+  across = position.y * reach / pixels;
+  bool roundA = jointA == vec2(0.0), roundB = jointB == vec2(0.0);
+  float over = end ? (roundB ? reach : 0.0) : (roundA ? -reach : 0.0);
+  float passed = end ? size + over : over;
+  past = vec2(roundA ? -passed : -1.0, roundB ? passed - size : -1.0) / pixels;
+  vec2 bend = end ? (roundB ? straight : jointB) : (roundA ? straight : jointA);
+  vec2 off = vec2(-bend.y, bend.x) * position.y * reach / dot(bend, straight) + straight * over;
+  gl_Position = at + vec4(off / resolution * at.w, 0.0, 0.0);
 }
 `;
 
@@ -66,18 +100,22 @@ const FRAGMENT = /* glsl */ `
 ${LIGHT}
 in vec4 tone;
 in vec3 spot, along;
+in vec2 past;
 in float across, pixels;
 
 void main() {
-  float far = abs(across);
+  float far = length(vec2(across, max(0.0, max(past.x, past.y))));
+#ifdef GLOWING
+  float rest = max(0.0, 1.0 - far * far), strength = tone.a * rest * rest * rest;
+#ifdef DARKENS
+  result = ink(tone.rgb, strength);
+#else
+  result = vec4(tone.rgb * strength, 0.0);
+#endif
+#else
   float edge = clamp((1.0 - far) * pixels * 0.5 + 0.5, 0.0, 1.0);
   if (edge <= 0.0) discard;
   if (shadowPass) { result = vec4(1.0); return; }
-#if defined(GLOWING) && !defined(DARKENS)
-  result = vec4(tone.rgb * tone.a * edge, 0.0);
-#elif defined(DARKENS)
-  result = vec4(min(tone.rgb, vec3(1.0)), 1.0) * tone.a * edge;
-#else
   vec3 toEye = normalize(cameraPosition - spot), t = normalize(along);
   vec3 side = normalize(cross(t, toEye)), front = cross(side, t);
   float c = clamp(across, -1.0, 1.0);
@@ -92,6 +130,15 @@ void main() {
 const QUAD = new THREE.BufferAttribute(new Float32Array([0, -1, 0, 1, -1, 0, 1, 1, 0, 0, 1, 0]), 3);
 const QUAD_INDEX = new THREE.BufferAttribute(new Uint16Array([0, 1, 2, 0, 2, 3]), 1);
 
+/** A column of each item's neighbours, too: they are in a curve what lies before and after a line. */
+function neighbours(geometry: THREE.BufferGeometry, rows: Uint32Array): void {
+  const padded = new Uint32Array(rows.length + 2); // who ends the column is its own neighbour
+  padded.set(rows, 1);
+  if (rows.length) [padded[0], padded[rows.length + 1]] = [rows[0], rows[rows.length - 1]];
+  const buffer = new THREE.InstancedInterleavedBuffer(padded, 1);
+  ["rowBefore", "rowA", "rowB", "rowAfter"].forEach((name, k) => geometry.setAttribute(name, new THREE.InterleavedBufferAttribute(buffer, 1, k)));
+}
+
 /** Attributes NAMEA and NAMEB of each line: its own two entries of a column, or that of this and the next item. */
 function ends(geometry: THREE.BufferGeometry, name: string, array: THREE.TypedArray, size: number, step: number, next: number, normalised = false) {
   const buffer = new THREE.InstancedInterleavedBuffer(array, step * size);
@@ -103,7 +150,8 @@ function lines<P extends SegmentsPart | CurvesPart>(
   part: P,
   shared: Places,
   theme: Theme,
-  shape: (part: P, frame: Frame) => { rows: Uint32Array; chained: boolean },
+  chained: boolean,
+  rowsOf: (part: P, frame: Frame) => Uint32Array,
 ): Drawable<P> {
   const own = part.places === null ? null : new Places();
   const uniforms = columnUniforms();
@@ -112,7 +160,7 @@ function lines<P extends SegmentsPart | CurvesPart>(
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
     uniforms: { ...light, ...(own ?? shared).uniforms, ...uniforms },
-    defines: { ...(part.glow && { GLOWING: 1 }), ...(part.glow && !theme.glows && { DARKENS: 1 }) },
+    defines: { ...(chained && { CHAINED: 1 }), ...(part.glow && { GLOWING: 1 }), ...(part.glow && !theme.glows && { DARKENS: 1 }) },
     side: THREE.DoubleSide,
     ...(part.glow ? (theme.glows ? GLOW : OVER) : SOLID),
   });
@@ -124,11 +172,12 @@ function lines<P extends SegmentsPart | CurvesPart>(
     update(part: P, frame: Frame) {
       if (own && part.places) own.set(part.places, frame);
       const { color, width } = columns(part.color, part.width, frame, uniforms);
-      const { rows, chained } = shape(part, frame);
+      const rows = rowsOf(part, frame);
       const geometry = new THREE.InstancedBufferGeometry();
       geometry.setAttribute("position", QUAD);
       geometry.setIndex(QUAD_INDEX);
-      ends(geometry, "row", rows, 1, chained ? 1 : 2, 1);
+      if (chained) neighbours(geometry, rows);
+      else ends(geometry, "row", rows, 1, 2, 1);
       if (color) ends(geometry, "color", color, 4, 1, chained ? 1 : 0, true);
       if (width) ends(geometry, "width", width, 1, 1, chained ? 1 : 0);
       geometry.instanceCount = chained ? Math.max(0, rows.length - 1) : rows.length / 2;
@@ -146,9 +195,9 @@ function lines<P extends SegmentsPart | CurvesPart>(
 }
 
 export function segments(part: SegmentsPart, shared: Places, theme: Theme): Drawable<SegmentsPart> {
-  return lines(part, shared, theme, (part, frame) => ({ rows: frame.view(part.pairs) as Uint32Array, chained: false }));
+  return lines(part, shared, theme, false, (part, frame) => frame.view(part.pairs) as Uint32Array);
 }
 
 export function curves(part: CurvesPart, shared: Places, theme: Theme): Drawable<CurvesPart> {
-  return lines(part, shared, theme, (part, frame) => ({ rows: frame.view(part.rows) as Uint32Array, chained: true }));
+  return lines(part, shared, theme, true, (part, frame) => frame.view(part.rows) as Uint32Array);
 }

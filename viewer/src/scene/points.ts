@@ -11,6 +11,7 @@ import { LIGHT, light } from "./light";
 import { PLACE, Places } from "./places";
 
 const LARGEST = 512; // [pixels]
+const SMOKE = 0.45; // of their light is what puffs have on a bright backdrop, from which they could not be told else
 
 const VERTEX = /* glsl */ `
 ${PLACE}
@@ -58,7 +59,7 @@ void main() {
   float rest = 1.0 - square, cube = rest * rest * rest;
   float strength = tone.a * cube * (cube * cube + 0.15);
 #ifdef DARKENS
-  result = vec4(min(tone.rgb, vec3(1.0)), 1.0) * min(1.0, strength * 1.5);
+  result = ink(tone.rgb, strength);
 #else
   result = vec4(tone.rgb * strength, 0.0);
 #endif
@@ -95,12 +96,13 @@ export function points(part: PointsPart, shared: Places, theme: Theme): Drawable
   const uniforms = columnUniforms();
   const geometry = new THREE.BufferGeometry();
   const halo = part.glow ? 2.6 : part.soft ? 1.6 : 1.0;
+  const daylight = part.soft && !theme.glows ? SMOKE * part.daylight : part.daylight;
   const blend = part.glow ? (theme.glows ? GLOW : OVER) : part.soft ? OVER : SOLID;
   const material = new THREE.ShaderMaterial({
     glslVersion: THREE.GLSL3,
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
-    uniforms: { ...light, ...(own ?? shared).uniforms, ...uniforms, daylight: { value: part.daylight }, spread: { value: halo }, smallest: { value: part.glow ? 2.5 : 1.5 } },
+    uniforms: { ...light, ...(own ?? shared).uniforms, ...uniforms, daylight: { value: daylight }, spread: { value: halo }, smallest: { value: part.glow ? 2.5 : 1.5 } },
     defines: {
       ...(part.glow && { GLOWING: 1 }),
       ...(part.glow && !theme.glows && { DARKENS: 1 }),
@@ -111,7 +113,6 @@ export function points(part: PointsPart, shared: Places, theme: Theme): Drawable
   });
   const object = new THREE.Points(geometry, material);
   if (!part.glow && !part.soft) object.layers.enable(1); // throws shadows
-
 
   return {
     object,

@@ -2,7 +2,7 @@
 
 import * as THREE from "three";
 import type { Frame } from "../frame";
-import type { Item, Part } from "../messages";
+import type { Block, Item, Part } from "../messages";
 import type { Theme } from "../theme";
 import { arrows } from "./arrows";
 import type { Drawable, Maker } from "./drawable";
@@ -18,6 +18,7 @@ interface Shown {
   mark: string; // what is fixed when it is made; another one means another object
   part: Part;
   source: Frame; // of the part
+  bent: { normals: Block; source: Frame } | null; // the newest normals, which come without the part
 }
 
 export class Registry {
@@ -43,15 +44,23 @@ export class Registry {
   /** Make everything again in another theme. */
   dress(theme: Theme): void {
     this.theme = theme;
-    for (const [name, { part, source }] of [...this.shown]) {
+    for (const [name, { part, source, bent }] of [...this.shown]) {
       this.drop(name);
       this.update(name, part, source);
+      if (bent) this.bend(name, bent.normals, bent.source);
     }
   }
 
   private draw(item: Item, newest: Frame, fresh: { part: Part; source: Frame } | undefined): void {
     if (fresh) this.update(item.name, fresh.part, fresh.source);
-    if (item.normals) this.shown.get(item.name)?.drawable.bend?.(item.normals, newest);
+    if (item.normals) this.bend(item.name, item.normals, newest);
+  }
+
+  private bend(name: string, normals: Block, source: Frame): void {
+    const shown = this.shown.get(name);
+    if (!shown) return;
+    shown.drawable.bend?.(normals, source);
+    shown.bent = { normals, source };
   }
 
   private update(name: string, part: Part, source: Frame): void {
@@ -61,7 +70,7 @@ export class Registry {
     shown = this.shown.get(name);
     if (!shown) {
       const make = MAKERS[part.kind] as Maker;
-      shown = { drawable: make(part, this.places, this.theme), mark, part, source };
+      shown = { drawable: make(part, this.places, this.theme), mark, part, source, bent: null };
       shown.drawable.object.frustumCulled = false;
       this.group.add(shown.drawable.object);
       this.shown.set(name, shown);
