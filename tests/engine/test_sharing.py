@@ -15,12 +15,14 @@ SCALE = {scale}
 
 @njit(**FLAGS)
 def scaled_by(a):
-    return SCALE * a
+    run = SCALE * a  # its own, and not the kernel
+    return run
 
 
 @njit(**FLAGS)
 def again(a):
-    return scaled_by(a) + {more}
+    run = scaled_by(a)
+    return run + {more}
 
 
 @njit(**ENTRY)

@@ -49,7 +49,7 @@ export class Lens {
     this.instruments = instruments;
     this.bar.hidden = false;
     this.choice.replaceChildren(
-      new Option("scene's own", ""),
+      new Option("no lens", ""),
       ...instruments.lenses.map(({ name, title }) => new Option(title, name)),
     );
     this.choice.value = instruments.lens;

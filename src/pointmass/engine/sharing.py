@@ -19,12 +19,12 @@ def share(module: ModuleType, source: str) -> None:
     texts, names = _parts(source)
     for name, text in texts.items():
         if text.startswith("@njit(") and "ENTRY" not in text.split("\n", 1)[0]:
-            key = sha256("\n".join(texts[n] for n in sorted(_needed(name, names))).encode()).hexdigest()
+            key = sha256("\n".join([name, *(texts[n] for n in sorted(_needed(name, names)))]).encode()).hexdigest()
             setattr(module, name, KNOWN.setdefault(key, getattr(module, name)))
 
 
 def _parts(source: str) -> tuple[dict[str, str], dict[str, set[str]]]:
-    """The text of each function and constant of a module, and the names in it."""
+    """The text of each function and constant of a module, and the names on which it depends."""
     lines = source.split("\n")
     texts, names = {}, {}
     for node in ast.parse(source).body:
@@ -38,8 +38,17 @@ def _parts(source: str) -> tuple[dict[str, str], dict[str, set[str]]]:
             continue
         for name in defined:
             texts[name] = "\n".join(lines[first - 1 : node.end_lineno])
-            names[name] = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
+            names[name] = _globals(node)
     return texts, names
+
+
+def _globals(node: ast.AST) -> set[str]:
+    """Names that come from outside of a function, or of an expression."""
+    found = [n for n in ast.walk(node) if isinstance(n, ast.Name)]
+    own = {n.id for n in found if isinstance(n.ctx, ast.Store)} | {
+        a.arg for a in ast.walk(node) if isinstance(a, ast.arg)
+    }
+    return {n.id for n in found} - own
 
 
 def _needed(name: str, names: dict[str, set[str]]) -> set[str]:
