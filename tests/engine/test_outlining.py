@@ -30,7 +30,7 @@ def work(x, y, n, shift):
         found += 1
         most = max(most, i)
     if found > 11:
-        for i in prange(n):
+        for i in prange(2, n):
             own = y[i]
             y[i] = own + found
     return found, most
@@ -46,7 +46,7 @@ def wanted(x: np.ndarray, y: np.ndarray, shift: float) -> tuple[int, int]:
     up = x >= 0
     y[up] = 4 * shift * x[up] + shift
     found = 10 + int(up.sum())
-    y += found
+    y[2:] += found
     return found, max(3, int(np.flatnonzero(up)[-1]))
 
 

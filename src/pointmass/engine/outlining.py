@@ -86,12 +86,14 @@ class _Loop:
     def call(self) -> list[str]:
         """What stands in its place."""
         assert isinstance(self.node.iter, ast.Call)
-        count = ast.unparse(self.node.iter.args[0])
-        call = f"{self.name}({', '.join([count, *self.given, *self.carried])})"
+        ends = [ast.unparse(end) for end in self.node.iter.args]
+        call = f"{self.name}({', '.join([*ends, *self.given, *self.carried])})"
         return [f"{' ' * self.node.col_offset}{f'{self._results} = ' if self.carried else ''}{call}"]
 
     def functions(self) -> list[str]:
         """What is done for one index, and the loop."""
+        assert isinstance(self.node.iter, ast.Call)
+        ends = "first_, last_" if len(self.node.iter.args) == 2 else "last_"
         begin = [f"{name} = {'0' if add == '+' else f'{name}_'}" for name, add in self.carried.items()]
         began = [f"{name}_" for name in self.carried]
         back = [f"return {self._results}"] if self.carried else []
@@ -109,14 +111,14 @@ class _Loop:
             loop = [f"{', '.join(results)} = {one}"]
         around = [
             *(f"{name} = {name}_" for name in self.carried),
-            f"for {self.index} in prange(count):",
+            f"for {self.index} in prange({ends}):",
             *indented([*loop, *more], 1),
             *back,
         ]
         inner = function(
             f"{self.name}_one", f"{self.index}, {arguments}", f"forceinline=True, **{flags}", [*begin, *body, *back]
         )
-        outer = function(self.name, f"count, {arguments}", "**LOOP", around)
+        outer = function(self.name, f"{ends}, {arguments}", "**LOOP", around)
         return [*inner.split("\n")[:-1], *outer.split("\n")[:-1]]
 
     @property
