@@ -12,9 +12,9 @@ import trimesh
 
 import pointmass as pm
 from pointmass.cache import Cache, plan, record
-from pointmass.cache.lock import locked
 from pointmass.cache.provenance import Making, same_until
 from pointmass.errors import InvalidInput
+from pointmass.lock import locked
 from pointmass.scenes import SCENES
 from tests.same import assert_same_frame
 
@@ -195,7 +195,7 @@ def test_a_law_in_python_cannot_be_known(tmp_path: Path) -> None:
 
 def test_a_second_writer_is_refused_with_the_number_of_the_first(tmp_path: Path) -> None:
     with (
-        locked(tmp_path / "a.zarr"),
+        locked(tmp_path / "a.zarr", "the cache"),
         pytest.raises(InvalidInput, match=f"being written by process {os.getpid()}: wait"),
     ):
         made(fountain(), tmp_path / "a.zarr", 2)

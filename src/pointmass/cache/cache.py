@@ -7,6 +7,7 @@ import math
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -29,6 +30,7 @@ from pointmass.cache.groups import (
 from pointmass.cache.provenance import Making
 from pointmass.errors import InvalidInput, number
 from pointmass.frame import Camera, Drawable, Frame
+from pointmass.lock import hidden
 
 if TYPE_CHECKING:
     from pointmass.scene import Scene
@@ -98,6 +100,11 @@ class Cache(Sequence[Frame]):
         path = Path(path)
         check_target(path, overwrite)
         attributes = attributes_of(path, scene, fps, camera, making, about)
+        if path.exists():
+            with suppress(InvalidInput):  # it is damaged, or of another version
+                cache = cls.open(path)
+                cache.cut(0, attributes)
+                return cache
         try:
             _make(path, attributes)
         except OSError as error:
@@ -209,7 +216,7 @@ class Cache(Sequence[Frame]):
                 self._count -= 1
                 _removed(self._folder(self._count))
             for folder in self._checkpoints():
-                if read_attributes(folder).get("frames", 0) > count:
+                if not _before(folder, count):
                     _removed(folder)
             seen = {folder_of(self.path, *pair) for k in range(count) for pair in self._drawn(k)}
             for folder in (self.path / "drawables").glob("*/*"):
@@ -223,6 +230,10 @@ class Cache(Sequence[Frame]):
         """Have other attributes."""
         write_attributes(self.path, attributes)
         self.attributes = attributes
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process needs: not the drawables that were seen last."""
+        return {**self.__dict__, "_seen": {}}
 
     def __len__(self) -> int:
         return self._count
@@ -356,11 +367,21 @@ def check_target(path: Path, overwrite: bool) -> None:
         raise InvalidInput(f"cannot write into folder {str(path.parent)!r}: {error.strerror}") from None
 
 
+def sweep(path: Path) -> None:
+    """Take away what processes that were killed have left of a cache half written or half removed."""
+    shutil.rmtree(hidden(path, ".new"), ignore_errors=True)
+    for folder in (path / "frames", path / CHECKPOINTS, path / "drawables", *path.glob("drawables/*")):
+        for left in folder.glob(".*"):
+            shutil.rmtree(left, ignore_errors=True)
+
+
 def _make(path: Path, attributes: dict[str, Any]) -> None:
-    """An empty cache, in place of the one that was there."""
-    beside = Path(tempfile.mkdtemp(prefix=f".{path.name[:32]}-", dir=path.parent))
+    """An empty cache, in place of what was there."""
+    beside = hidden(path, ".new")
     try:
+        shutil.rmtree(beside, ignore_errors=True)
         new = beside / "new"
+        beside.mkdir()
         for folder, what in ((new, attributes), (new / "frames", {}), (new / "drawables", {})):
             write_group(folder, what, {})
         if path.exists():
@@ -368,6 +389,14 @@ def _make(path: Path, attributes: dict[str, Any]) -> None:
         new.rename(path)
     finally:
         shutil.rmtree(beside, ignore_errors=True)
+
+
+def _before(checkpoint: Path, count: int) -> bool:
+    """Whether a checkpoint can be read and no more than `count` frames come before it."""
+    try:
+        return int(read_attributes(checkpoint)["frames"]) <= count
+    except (Damaged, KeyError, TypeError, ValueError):
+        return False
 
 
 def _removed(folder: Path) -> None:

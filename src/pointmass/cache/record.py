@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pointmass.cache.cache import Cache, attributes_of, check_target
+from pointmass.cache.cache import Cache, attributes_of, check_target, sweep
 from pointmass.cache.groups import Array
-from pointmass.cache.lock import locked
 from pointmass.cache.provenance import Change, Making
 from pointmass.engine.island import CHECKPOINT
 from pointmass.errors import Diverged, InvalidInput, number, whole_number
 from pointmass.frame import Camera, Frame
+from pointmass.lock import locked
 
 if TYPE_CHECKING:
     from pointmass.scene import Scene
@@ -121,7 +121,8 @@ def record(
     if resume and (sim.steps or sim.frames_seen):
         raise InvalidInput(f"resume = True is not allowed for a simulation after {sim.steps} steps: give a fresh one")
     check_target(path, overwrite or resume)
-    with locked(path):
+    with locked(path, "the cache"):
+        sweep(path)
         writer = _Writer(sim, path, fps, scene, camera, overwrite or resume, progress, about or {})
         if resume and writer.goes_on(plan(path, sim, scene, fps), frames):
             return writer.flush()

@@ -11,7 +11,7 @@ import click
 from pointmass.cli.main import stopped
 from pointmass.cli.options import RunOptions, as_json, load_scene, quiet, run_options
 from pointmass.cli.progress import progress
-from pointmass.cli.render import sample
+from pointmass.cli.render import sample, unfinished
 from pointmass.cli.report import Report, counted
 from pointmass.cli.run import simulated
 from pointmass.errors import Diverged, InvalidInput, unknown
@@ -52,7 +52,7 @@ def command(source: str, output: str, frame: int | None, as_json: bool, quiet: b
     except KeyboardInterrupt as error:
         report.frames, report.interrupted = 0, True
         report.show(as_json, quiet)
-        raise stopped(error, f"{output!r} was not written") from None
+        raise stopped(error, unfinished(path)) from None
     report.show(as_json, quiet)
     if report.diverged is not None:
         raise Diverged(f"{report.diverged}; {output!r} holds the {counted(report.frames)} before it")
@@ -73,17 +73,16 @@ class Way:
 
     def __init__(self, path: Path, frame: int | None) -> None:
         from pointmass.export import EXPORTERS, check_export
-        from pointmass.render import check_write
-        from pointmass.render.film import WRITERS
+        from pointmass.render import SUFFIXES, check_write
 
         self.path, self.frame, self.suffix = path, frame, path.suffix.lower()
-        self.film = self.suffix in WRITERS
+        self.film = self.suffix in SUFFIXES
         if self.film:
             check_write(path)
         elif self.suffix in EXPORTERS:
             check_export(path)
         elif self.suffix != ".html":
-            raise unknown("kind of export", path.suffix, [*EXPORTERS, *WRITERS, ".html"])
+            raise unknown("kind of export", path.suffix, [*EXPORTERS, *SUFFIXES, ".html"])
 
     def check_frame(self, count: int) -> None:
         """Refuse a frame that is not there.
@@ -126,4 +125,4 @@ class Way:
         from pointmass.render import fit_camera, write
 
         camera = fit_camera(sample(cache), cache.camera) if len(cache) else None
-        write(iter(frames), self.path, fps=cache.fps, camera=camera, progress=tick)
+        write(frames, self.path, fps=cache.fps, camera=camera, progress=tick)
