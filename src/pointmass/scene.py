@@ -434,7 +434,9 @@ def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, fol
     except InvalidInput as error:
         raise InvalidInput(f"{where} ({kind}): {error}") from None
     except (MemoryError, OverflowError, ValueError) as error:  # NumPy's, about sizes that no machine holds
-        raise InvalidInput(f"{where} ({kind}) does not fit into memory: {error}") from None
+        raise InvalidInput(
+            f"{where} ({kind}) does not fit into memory, of which a command takes 75% without --allow-large: {error}"
+        ) from None
 
 
 def _grid(value: Any, folder: Path | None) -> Any:

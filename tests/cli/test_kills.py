@@ -141,5 +141,5 @@ def test_a_killed_command_goes_on_to_the_same_bits(kind: str, folder: Path, fork
 
 @pytest.mark.full
 @pytest.mark.parametrize("kind", COMMANDS)
-def test_a_command_that_is_killed_two_hundred_times(kind: str, folder: Path, forks: Forks) -> None:
-    kill_and_go_on(kind, folder, forks, random.Random(f"{kind} again"), 200)
+def test_commands_that_are_killed_two_hundred_times(kind: str, folder: Path, forks: Forks) -> None:
+    kill_and_go_on(kind, folder, forks, random.Random(f"{kind} again"), 1 + 200 // len(COMMANDS))

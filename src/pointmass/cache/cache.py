@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from pointmass.cache.checks import check_frame
 from pointmass.cache.drawables import folder_of, read_drawable, write_drawable
 from pointmass.cache.groups import (
     METADATA,
@@ -23,12 +24,13 @@ from pointmass.cache.groups import (
     packed,
     read_attributes,
     read_group,
+    stated_attributes,
     unpacked,
     write_attributes,
     write_group,
 )
 from pointmass.cache.provenance import Making
-from pointmass.errors import InvalidInput, number
+from pointmass.errors import InvalidInput, number, shown
 from pointmass.frame import Camera, Drawable, Frame
 from pointmass.lock import hidden
 
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
     from pointmass.scene import Scene
 
 FORMAT = "pointmass cache"
-VERSION = 1
+VERSION = 2
 CHECKPOINTS = "checkpoints"
 LIBRARIES = ("numpy", "scipy", "numba", "zarr")
 
@@ -123,19 +125,21 @@ class Cache(Sequence[Frame]):
         path = Path(path)
         if not path.is_dir():
             raise InvalidInput(f"cannot read the cache {str(path)!r}: there is no such folder")
+        stated = stated_attributes(path)
+        if stated.get("format") != FORMAT:
+            raise InvalidInput(f"{str(path)!r} is not a pointmass cache: make one with pointmass run")
+        if stated.get("version") != VERSION:
+            raise InvalidInput(
+                f"the cache {str(path)!r} has version {shown(stated.get('version'))}:"
+                f" this pointmass reads version {VERSION}; run the scene again"
+            )
         try:
             attributes = read_attributes(path)
             numbers = sorted(int(f.name) for f in (path / "frames").iterdir() if f.name.isdecimal())
+            number("fps", attributes["fps"], above=0)
             camera_of(attributes)
-        except (Damaged, OSError, KeyError, TypeError, ValueError):
-            attributes, numbers = {}, []
-        if attributes.get("format") != FORMAT:
-            raise InvalidInput(f"{str(path)!r} is not a pointmass cache: make one with pointmass run")
-        if attributes.get("version") != VERSION:
-            raise InvalidInput(
-                f"the cache {str(path)!r} has version {attributes.get('version')}:"
-                f" this pointmass reads version {VERSION}"
-            )
+        except (Damaged, OSError, KeyError, TypeError, ValueError, AttributeError, RecursionError):
+            raise InvalidInput(f"the cache {str(path)!r} is damaged: run the scene again") from None
         for k, found in enumerate(numbers):
             if k != found:
                 raise InvalidInput(f"the cache {str(path)!r} is damaged: frame {k} is missing; run the scene again")
@@ -268,7 +272,7 @@ class Cache(Sequence[Frame]):
             attributes, arrays = read_group(self._folder(k))
             drawables = tuple(self._drawable(name, version) for name, version in attributes["drawables"])
             self._seen = {d.name: d for d in drawables}
-            return Frame(
+            frame = Frame(
                 number=attributes["number"],
                 time=unpacked(attributes["time"]),
                 ids=arrays["ids"],
@@ -277,7 +281,9 @@ class Cache(Sequence[Frame]):
                 drawables=drawables,
                 quantities={name: unpacked(value) for name, value in attributes["quantities"].items()},
             )
-        except (Damaged, KeyError, TypeError, ValueError) as error:
+            check_frame(frame)
+            return frame
+        except (Damaged, KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
             raise InvalidInput(
                 f"frame {k} of the cache {str(self.path)!r} cannot be read: {error}; run the scene again"
             ) from None
@@ -353,11 +359,7 @@ def check_target(path: Path, overwrite: bool) -> None:
     if not path.parent.is_dir():
         raise InvalidInput(f"cannot write the cache {str(path)!r}: there is no folder {str(path.parent)!r}")
     if path.exists() or path.is_symlink():
-        try:
-            is_cache = read_attributes(path).get("format") == FORMAT
-        except Damaged:
-            is_cache = False
-        if not is_cache:
+        if stated_attributes(path).get("format") != FORMAT:
             raise InvalidInput(f"cannot write the cache {str(path)!r}: something else is there; give another name")
         if not overwrite:
             raise InvalidInput(f"the cache {str(path)!r} is there already: give another name, or overwrite=True")
