@@ -131,7 +131,7 @@ def kill_and_go_on(kind: str, folder: Path, forks: Forks, chance: random.Random,
         answer = forks(COMMANDS[kind])
         assert answer["code"] == 0, (folder / "commands.log").read_text()
         assert made(folder) == whole  # the same bits, and nothing beside them
-    assert hit > 0.4 * count or count == 1
+    assert hit > 0.2 * count or count == 1
 
 
 @pytest.mark.parametrize("kind", COMMANDS)

@@ -154,6 +154,7 @@ class Cache(Sequence[Frame]):
             It cannot be written, such as on a full disk. The frames before it stay.
         """
         attributes = {
+            "place": self._count,
             "number": frame.number,
             "time": packed(frame.time),
             "quantities": {name: packed(value) for name, value in frame.quantities.items()},
@@ -201,7 +202,8 @@ class Cache(Sequence[Frame]):
         for folder in self._checkpoints():
             try:
                 attributes = read_attributes(folder)
-                if attributes["frames"] <= len(self) and attributes["time"] < before:
+                fits = attributes["frames"] <= len(self) and attributes["time"] < before
+                if fits and attributes["step"] == int(folder.name):
                     return read_group(folder)[1]
             except (Damaged, KeyError, TypeError):
                 continue  # an earlier one will do
@@ -270,6 +272,8 @@ class Cache(Sequence[Frame]):
             )
         try:
             attributes, arrays = read_group(self._folder(k))
+            if attributes["place"] != k:
+                raise Damaged("it is another frame")
             drawables = tuple(self._drawable(name, version) for name, version in attributes["drawables"])
             self._seen = {d.name: d for d in drawables}
             frame = Frame(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pointmass.cache.groups import Damaged
-from pointmass.frame import PATTERNS, Curves, Drawable, Frame, Points, Segments, Triangles
+from pointmass.frame import PATTERNS, Arrows, Curves, Drawable, Frame, Points, Segments, Triangles
 
 Shape = tuple[int | None, ...]  # None = any length
 
@@ -91,24 +91,33 @@ def check_fields(drawable: Drawable) -> None:
 
 
 def _check_rows(drawable: Drawable, particles: int) -> None:
-    """Refuse a drawable with corners that are not there."""
+    """Refuse a drawable with corners that are not there, or with more or fewer values than items."""
     vertices = drawable.vertices
-    count = particles if vertices is None else len(vertices)
+    corners = particles if vertices is None else len(vertices)
+    rows: Any = None
+    each: tuple[str, ...]
     match drawable:
         case Points():
-            rows = drawable.index
+            rows, each = drawable.index, ("radius", "color", "motion", "normals")
+            count = corners if rows is None else len(rows)
         case Segments():
-            rows = drawable.pairs
+            rows, each = drawable.pairs, ("width", "color")
+            count = len(rows)
         case Curves():
-            rows, offsets = drawable.index, drawable.offsets
-            _require("offsets", len(offsets) > 0 and offsets[0] == 0 and offsets[-1] == len(rows))
+            rows, each, offsets = drawable.index, ("width", "color"), drawable.offsets
+            count = len(rows)
+            _require("offsets", len(offsets) > 0 and offsets[0] == 0 and offsets[-1] == count)
             _require("offsets", bool((np.diff(offsets) >= 0).all()))
         case Triangles():
-            rows = drawable.faces
-        case _:
-            rows = None
+            rows, each, count = drawable.faces, ("color",), corners
+            _require("uv", drawable.uv is None or len(drawable.uv) == len(rows))
+        case Arrows():
+            each, count = ("vectors", "width", "color"), corners
     if rows is not None and rows.size:
-        _require("rows", bool(rows.min() >= 0 and rows.max() < count))
+        _require("rows", bool(rows.min() >= 0 and rows.max() < corners))
+    for name in each:
+        value = getattr(drawable, name)
+        _require(name, value is None or np.ndim(value) == int(name == "color") or len(value) == count)
 
 
 def _require(name: str, holds: bool) -> None:

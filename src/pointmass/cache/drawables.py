@@ -56,4 +56,6 @@ def read_drawable(root: Path, name: str, version: int) -> Drawable:
     except (KeyError, TypeError, ValueError) as error:
         raise Damaged(f"drawable {name!r} is damaged ({type(error).__name__})") from None
     check_fields(drawable)
+    if (drawable.name, drawable.version) != (name, version):
+        raise Damaged(f"drawable {name!r} is another one")
     return drawable

@@ -3,8 +3,8 @@
 The zarr library takes some 4 ms to create an array, which is more than many a frame takes to compute. Here it is asked
 once for the metadata of each kind of array; the chunk of an array is then its bytes, compressed.
 
-What is damaged is noticed: chunks carry Zstandard's checksum, which every reader of them checks, and the attributes of
-a group say what arrays it has, and their own checksum.
+What is damaged is noticed: chunks end with Zstandard's checksum, which every reader of them checks, and the attributes
+of a group say what arrays it has, with these checksums, and have one of their own.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ METADATA = "zarr.json"
 LEVEL = 1  # of Zstandard: higher ones take longer and save little on numbers that look random
 SMALL = 16  # arrays with fewer entries are kept in the attributes: no files of their own
 CODECS = ["bytes", "zstd"]
-CHECK = "check"  # attribute of a group: the type and shape of its arrays, and the checksum of all attributes
+CHECK = "check"  # attribute of a group: type, shape and checksum of its arrays, and the checksum of all attributes
+SUM = 4  # bytes of the checksum at the end of a chunk
 LARGEST = 1 << 30  # bytes of metadata
 FRAME = 0xFD2FB528  # how data of Zstandard begin
 
@@ -48,10 +49,9 @@ def write_group(folder: Path, attributes: Attributes, arrays: Mapping[str, Array
     part = folder.with_name(f".{folder.name}.part")
     try:
         part.mkdir()
-        for name, array in arrays.items():
-            _write_array(part / name, array)
+        kinds = {name: _write_array(part / name, array) for name, array in arrays.items()}
         # Its metadata come last: what a kill leaves behind is then no group for other programs either.
-        _write_attributes(part / METADATA, attributes, {name: _kind(array) for name, array in arrays.items()})
+        _write_attributes(part / METADATA, attributes, kinds)
         part.rename(folder)
     except FileExistsError:
         shutil.rmtree(part)
@@ -96,10 +96,7 @@ def read_group(folder: Path) -> tuple[Attributes, dict[str, Array]]:
     attributes, kinds = _attributes_and_kinds(folder)
     if any(Path(name).name != name or name == ".." for name in kinds):
         raise Damaged(f"{folder.name} has arrays outside of it")
-    arrays = {name: _read_array(folder / name) for name in kinds}
-    for name, array in arrays.items():
-        if _kind(array) != kinds[name]:
-            raise Damaged(f"{name} is another array than that which was written")
+    arrays = {name: _read_array(folder / name, kind) for name, kind in kinds.items()}
     return attributes, arrays
 
 
@@ -149,7 +146,8 @@ def _metadata_of(dtype: str, ndim: int) -> Attributes:
     return result
 
 
-def _write_array(folder: Path, array: Array) -> None:
+def _write_array(folder: Path, array: Array) -> list[Any]:
+    """Write an array; returns its type, shape and checksum."""
     from numcodecs.zstd import compress
 
     array = np.asarray(array, array.dtype.newbyteorder("<"), order="C")
@@ -158,11 +156,14 @@ def _write_array(folder: Path, array: Array) -> None:
     metadata |= {"shape": list(array.shape), "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": chunk}}}
     folder.mkdir()
     _write_json(folder / METADATA, metadata)
+    data = b""
     if array.size:  # an array without entries has no chunk
-        (folder / _chunk(array.ndim)).write_bytes(compress(array, LEVEL, True))
+        data = compress(array, LEVEL, True)
+        (folder / _chunk(array.ndim)).write_bytes(data)
+    return _kind(array, data)
 
 
-def _read_array(folder: Path) -> Array:
+def _read_array(folder: Path, kind: list[Any]) -> Array:
     from numcodecs.zstd import decompress
 
     metadata = _read_json(folder / METADATA)
@@ -172,9 +173,11 @@ def _read_array(folder: Path) -> Array:
         codecs = [codec["name"] for codec in metadata["codecs"]]
         if codecs != CODECS or chunk != tuple(max(1, side) for side in shape):
             raise Damaged(f"{folder.name} was stored by another program")
+        data = b"" if 0 in shape else (folder / _chunk(len(shape))).read_bytes()
+        if [dtype.name, *shape, _sum(data)] != kind:
+            raise Damaged(f"{folder.name} is another array than that which was written")
         if 0 in shape:
             return np.zeros(shape, dtype)
-        data = (folder / _chunk(len(shape))).read_bytes()
         if _promised(data) != math.prod(shape) * dtype.itemsize:  # before there is room for it
             raise Damaged(f"{folder.name} has another length than its shape says")
         result = np.frombuffer(decompress(data), dtype.newbyteorder("<")).reshape(shape)
@@ -200,9 +203,13 @@ def _chunk(ndim: int) -> str:
     return ".".join(["c", *["0"] * ndim])
 
 
-def _kind(array: Array) -> list[Any]:
-    """Type and shape of an array as they can stand in JSON."""
-    return [array.dtype.newbyteorder("=").name, *array.shape]
+def _kind(array: Array, data: bytes) -> list[Any]:
+    """Type, shape and checksum of an array as they can stand in JSON."""
+    return [array.dtype.newbyteorder("=").name, *array.shape, _sum(data)]
+
+
+def _sum(data: bytes) -> int:
+    return int.from_bytes(data[-SUM:], "little")
 
 
 def _write_attributes(path: Path, attributes: Attributes, kinds: Mapping[str, list[Any]]) -> None:
