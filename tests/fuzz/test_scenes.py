@@ -84,7 +84,7 @@ def a_hostile_document(data: Any, documents: list[dict[str, Any]]) -> None:
             case "twice" if isinstance(here, list):
                 here.append(here[last])
             case _:
-                here[last] = data.draw(HOSTILE)
+                here[last] = copy.deepcopy(data.draw(HOSTILE))
     try:
         text = dumps(document)
     except (TypeError, ValueError):
