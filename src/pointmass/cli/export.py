@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -110,10 +112,15 @@ class Way:
 
     def _file(self, frames: Sequence[Frame], cache: Cache, tick: Tick) -> None:
         from pointmass.export import About, export
-        from pointmass.render import fit_camera
 
-        camera = fit_camera(sample(cache), cache.camera) if self.suffix.startswith(".usd") and len(cache) else None
-        export(frames, self.path, tick, About(fps=cache.fps, name=cache.attributes["name"], camera=camera))
+        about = About(fps=cache.fps, name=cache.attributes["name"])
+        if self.suffix.startswith(".usd") and len(cache):
+            from pointmass.render import fit_camera
+            from pointmass.render.camera import moved, moves
+
+            camera = fit_camera(sample(cache), cache.camera)
+            about = replace(about, camera=camera, moved=partial(moved, camera) if moves(camera) else None)
+        export(frames, self.path, tick, about)
 
     def _page(self, frames: Sequence[Frame], cache: Cache, tick: Tick) -> None:
         from pointmass.viewer.film import to_html

@@ -92,36 +92,39 @@ def simulate(
     InvalidInput
         There is nothing to resume.
     """
-    from pointmass.cache import check_target, plan, record
+    from pointmass.cache import check_target, record
 
     check_target(path, overwrite=True)
+    untold: Plan | None = None  # of another scene it is not known before that it can run at all
     with warnings_said(quiet), laws_said(quiet), progress("simulating", scene.frames, quiet) as tick:
-        sim = scene.simulation()
-        found = plan(path, sim, scene, scene.fps)
-        if mode == "resume" and not found.same:
-            raise InvalidInput(_no_resume(found, path))
-        report.frames = found.kept if mode != "anew" else 0
-        untold = mode != "anew" and not quiet
-        if untold and found.same:
-            _say(found, path, scene.frames)
-            untold = False
+
+        def planned(found: Plan) -> None:
+            nonlocal untold
+            if mode == "resume" and not found.same:
+                raise InvalidInput(_no_resume(found, path))
+            report.frames = found.kept
+            if found.same and not quiet:
+                _say(found, path, scene.frames)
+            elif not quiet:
+                untold = found
 
         def count(frames: int) -> None:
             nonlocal untold
-            if untold:  # of another scene it is not known before that it can run at all
-                _say(found, path, scene.frames)
-                untold = False
+            if untold is not None:
+                _say(untold, path, scene.frames)
+                untold = None
             report.frames = frames
             tick(frames)
 
         record(
-            sim,
+            scene.simulation(),
             path,
             scene.frames,
             scene.fps,
             scene=scene,
             overwrite=True,
             resume=mode != "anew",
+            planned=planned,
             progress=count,
             about=about,
         )
