@@ -34,8 +34,8 @@ def wait_for_frames(cache: Path, count: int) -> None:
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="needs a list of processes")
 def test_the_processes_of_a_killed_render_end(tmp_path: Path) -> None:
     assert start(tmp_path, "run", "pendulum", "-o", "a.zarr", "--frames", "130", "--quiet").wait(timeout=60) == 0
-    film = ["render", "a.zarr", "--processes", "2", "--size", "96x64", "--quiet", "-o"]
-    process = start(tmp_path, *film, "killed.mp4")
+    film = ["render", "a.zarr", "--size", "96x64", "--quiet", "-o"]
+    process = start(tmp_path, *film, "killed.mp4", "--processes", "2")
     deadline = time.monotonic() + 60
     while not list(tmp_path.glob(".killed.mp4.part/*")):
         assert time.monotonic() < deadline

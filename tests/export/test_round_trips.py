@@ -282,7 +282,8 @@ def test_a_camera_that_moves_moves_in_a_stage(tmp_path: Path, monkeypatch: pytes
         record(each.simulation(), tmp_path / f"{name}.zarr", 4, 4.0, scene=each)
         monkeypatch.chdir(tmp_path)
         assert CliRunner().invoke(main, ["export", f"{name}.zarr", f"{name}.usd", "--quiet"]).exit_code == 0
-        camera = UsdGeom.Camera(Usd.Stage.Open(f"{name}.usd").GetPrimAtPath("/World/camera"))
+        stage = Usd.Stage.Open(f"{name}.usd")
+        camera = UsdGeom.Camera(stage.GetPrimAtPath("/World/camera"))
         places = [camera.ComputeLocalToWorldTransform(k).ExtractTranslation() for k in range(4)]
         wanted = [moved(each.camera, frame).position for frame in Cache.open(f"{name}.zarr")]
         np.testing.assert_allclose(places, wanted, atol=1e-12)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import tomllib
 import warnings
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +43,7 @@ def documents() -> list[dict[str, Any]]:
 
 def begin(text: str) -> None:
     """Read a scene and make its first step, if it can."""
-    with limited(), warnings.catch_warnings():
+    with limited(), warnings.catch_warnings(), suppress(MemoryError):  # a command has a sentence for that
         warnings.simplefilter("ignore")
         with refused_or_right():
             scene = Scene.from_toml(text)

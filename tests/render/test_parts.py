@@ -72,6 +72,16 @@ def test_a_stopped_film_goes_on_and_has_the_same_bytes(tmp_path, drawn, name):
     assert (tmp_path / name).read_bytes() == (tmp_path / f"whole{name}").read_bytes()
 
 
+@pytest.mark.parametrize("name", ["a.mp4", "a.webm"])
+def test_films_of_small_pictures_have_the_same_bytes(tmp_path, name):
+    frames = film(12)
+    seen = set()
+    for _ in range(30):
+        write(iter(frames), tmp_path / name, **SETTINGS)
+        seen.add((tmp_path / name).read_bytes())
+    assert len(seen) == 1
+
+
 def test_only_parts_whose_frames_or_look_have_changed_are_drawn_again(tmp_path, drawn):
     frames = film(12)
     with pytest.raises(KeyboardInterrupt):

@@ -46,7 +46,7 @@ def memory_sentence(error: MemoryError) -> str:
     """What there is to say when there is no more memory."""
     limits = _limits()
     bound = -1 if limits is None else limits[1][0]
-    if bound != int(SHARE * _machine()):
+    if bound < 0 or bound != int(SHARE * _machine()):
         return f"there is not enough memory: {error or 'take fewer particles or a smaller picture'}"
     return (
         f"this needs more than {bound / 2**30:.1f} GiB, {SHARE:.0%} of the machine's memory: take fewer particles or a"

@@ -217,7 +217,7 @@ KINDS: dict[str, Kind] = {
         part=".mp4",
         codec="libx264",
         pixels="yuv420p",
-        options={"preset": "veryfast", "crf": "18"},
+        options={"preset": "veryfast", "crf": "18", "mbtree": "0"},  # with it small pictures are not always the same
         even=True,
     ),
     ".webm": Kind(
