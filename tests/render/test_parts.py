@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -135,6 +136,28 @@ def test_several_processes_make_the_same_bytes(tmp_path, monkeypatch, name):
     assert names(folders[0]) == names(folders[1])
     for file in names(folders[0]):
         assert (folders[0] / file).read_bytes() == (folders[1] / file).read_bytes()
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.gif", "x_%02d.png"])
+def test_frames_are_let_go(tmp_path, name):
+    """A film of 24 frames takes no more memory than one of 6, beyond two frames."""
+    n = 5_000
+    places = np.random.default_rng(5).normal(0, 2, (n, 3))
+
+    def run(count):
+        for k in range(count):
+            yield frame(places + 0.01 * k, Points(name="p", radius=0.005), number=k)
+
+    def peak(count):
+        (tmp_path / str(count)).mkdir()
+        tracemalloc.start()
+        write(run(count), tmp_path / str(count) / name, **SETTINGS)
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return most
+
+    write(run(2), tmp_path / name, **SETTINGS)  # loads and compiles
+    assert peak(24) < peak(6) + 2 * 2 * n * 3 * 8
 
 
 def test_an_error_in_a_process_is_told(tmp_path):
