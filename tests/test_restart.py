@@ -102,9 +102,32 @@ def test_a_state_of_something_else_is_refused() -> None:
         pm.Scene(bodies=[pm.chain(4)], dt=1 / 100).simulation().put_state(state)
 
 
-def test_a_run_that_tears_says_that_its_state_is_not_all() -> None:
-    assert "Tear changes who is joined to whom" in shipped("tear")().restless
-    assert shipped("fish")().restless == ""
+@pytest.mark.parametrize("solver", ["symplectic_euler", "xpbd", "implicit_euler"])
+def test_a_cloth_and_a_net_that_tear_go_on(solver: str) -> None:
+    def make() -> Simulation:
+        return pm.Scene(
+            bodies=[
+                pm.cloth(7, 7, (0.5, 0.5), pinned="top edge", stretch=60.0, shear=20.0),
+                pm.net(3, 3, 0.5, links=2, pinned="top edge"),
+                pm.points([[0.6, 0, 0]], lifetime=0.1),
+            ],
+            forces=[pm.Field(("0", "-500*m*t*(1 + x)", "20*m")), pm.Drag("0.001 + 0.01*m")],
+            constraints=[pm.Tear(0.1, spread=0.5, most=1), pm.StrainLimit(0.3)],
+            solver=pm.SOLVERS[solver](),
+            dt=1 / 1200,
+            look=pm.Look(trails=0.05),
+        ).simulation()
+
+    sim = make()
+    sim.step(2 * CHECKPOINT)
+    torn = sim.constraints[0].breaks
+    sim.step(2 * CHECKPOINT)
+    assert 0 < torn < sim.constraints[0].breaks
+    goes_on(make, 16, fps=60.0)
+
+
+def test_a_run_that_is_all_in_its_state_has_nothing_to_say() -> None:
+    assert shipped("tear")().restless == shipped("fish")().restless == ""
 
 
 def test_a_brain_that_remembers_words_says_so() -> None:

@@ -25,6 +25,7 @@ from pointmass.scenes import SCENES
 from pointmass.schema import LISTS, UNKNOWN, entry_model, form_of, json_schema, settings_model
 from pointmass.solvers import ALIASES, SOLVERS
 from pointmass.toml import dumps
+from tests.shapes import CLOUD
 
 SCHEMA = Path(__file__).parent.parent / "docs" / "scene.schema.json"
 VALIDATOR = jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text()))
@@ -51,6 +52,7 @@ NEEDED: dict[str, dict[str, Any]] = {
     "flow": {"velocity": ["-y", "x", "0.1*t"]},
     "mesh": {"mesh": [[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]]},
     "cloth_from_mesh": {"mesh": [[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]]},
+    "cloud": {"file": CLOUD},
     "points": {"x": [[0.0, 1.0, 0.0], [0.5, 1.2, 0.1]]},
     "scatter": {"count": 4},
     "polygon": {"vertices": SQUARE},

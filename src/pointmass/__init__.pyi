@@ -16,6 +16,9 @@ from .bodies import (
     cloth_from_mesh as cloth_from_mesh,
 )
 from .bodies import (
+    cloud as cloud,
+)
+from .bodies import (
     fish as fish,
 )
 from .bodies import (

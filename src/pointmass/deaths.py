@@ -40,9 +40,11 @@ class Deaths:
         return np.concatenate(found)
 
     def known(self) -> tuple[NDArray[np.int64], Array]:
-        """Ids of all who are going to die, and when [s], in no order: another one that is told them knows the same."""
-        ids = [np.zeros(0, np.int64), *(batch[2] for batch in self._batches)]
-        return np.concatenate(ids), np.concatenate([np.zeros(0), *(batch[3] for batch in self._batches)])
+        """Ids of all who are going to die, and when [s], in order: another one that is told them knows the same."""
+        ids = np.concatenate([np.zeros(0, np.int64), *(batch[2] for batch in self._batches)])
+        death = np.concatenate([np.zeros(0), *(batch[3] for batch in self._batches)])
+        order = np.lexsort((ids, death))  # whichever batches they came in
+        return ids[order], death[order]
 
     def _push(self, ids: NDArray[np.int64], death: Array) -> None:
         if len(ids):

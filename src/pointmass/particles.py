@@ -295,6 +295,7 @@ class Particles:
         """Everything that may change while a run goes on, by name: see `Simulation.state`."""
         columns = {name: self._arrays[name].copy() for name in ("x", "v", *PLAIN)}
         columns |= {"id": self.id.copy(), "pinned": self._held.copy(), "version": np.array([self.version])}
+        columns["next_id"] = np.array([self._next_id])
         columns |= {f"attribute.{name}": values.copy() for name, values in self.attributes.items()}
         groups = list(self.groups.values())
         return columns | {"groups": np.array(groups, bool).reshape(len(groups), len(self))}
@@ -308,7 +309,7 @@ class Particles:
         self._held[:] = state["pinned"]
         for mask, stored in zip(self.groups.values(), state["groups"], strict=True):
             mask[:] = stored
-        self.version = int(state["version"][0])
+        self.version, self._next_id = int(state["version"][0]), int(state["next_id"][0])
 
     def select(self, which: Selection) -> NDArray[np.intp]:
         """Rows of a selection, ascending.

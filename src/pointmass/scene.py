@@ -44,7 +44,7 @@ from pointmass.toml import dumps
 from pointmass.zones import WHEN_FULL, WhenFull, Zone
 
 VERSION = 1
-PATHS = (".grid", ".mesh", ".heights", ".distances")  # parameters that may be paths
+PATHS = (".grid", ".mesh", ".heights", ".distances", ".file")  # parameters that may be paths
 HOLDS: dict[str, type] = {
     **{"bodies": Body, "forces": Force, "colliders": Collider, "emitters": Emitter, "zones": Zone},
     "motions": RigidMotion,
@@ -427,14 +427,16 @@ def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, fol
             values["around"] = [_made(COLLIDERS, solid, f"{where}.around.{k}", folder) for k, solid in solids]
         if "grid" in values:
             values["grid"] = _grid(values["grid"], folder)
-        for name in ("mesh", "heights", "distances"):
+        for name in ("mesh", "heights", "distances", "file"):
             if isinstance(values.get(name), str):
                 values[name] = _found(name, values[name], folder)
         return registry[kind](**values)
     except InvalidInput as error:
         raise InvalidInput(f"{where} ({kind}): {error}") from None
     except (MemoryError, OverflowError, ValueError) as error:  # NumPy's, about sizes that no machine holds
-        raise InvalidInput(f"{where} ({kind}) does not fit into memory: {error}") from None
+        raise InvalidInput(
+            f"{where} ({kind}) does not fit into memory, of which a command takes 75% without --allow-large: {error}"
+        ) from None
 
 
 def _grid(value: Any, folder: Path | None) -> Any:

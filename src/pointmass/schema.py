@@ -101,6 +101,7 @@ FORMS: dict[str, tuple[Any, str]] = {  # by the annotation of a constructor's pa
         "a list of times and counts, such as [[0, 100], [0.5, 200]]",
     ),
     "Surfaces": (str | list[str], "the name of a surface or body, such as 'cloth', or a list of names"),
+    "str | Path": (str, "the path of a file"),
     "str | Sequence[str]": (str | list[str], "a name, or a list of names"),
     "TriangleSource": (
         str | _exactly(2, list[list[float]]) | _exactly(3, list[list[float]]),

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.constraints.constraint import Constraint, Step, between
+from pointmass.constraints.torn import put_torn_state, torn_state
 from pointmass.controllers.controller import Controller
 from pointmass.deaths import Deaths
 from pointmass.emitters.emitter import Birth, Emitter
@@ -300,9 +301,6 @@ class Simulation:
     @property
     def restless(self) -> str:
         """Why `state` does not hold all of the run, as a sentence; empty if it does."""
-        for constraint in self.constraints:
-            if constraint.breaks_up:
-                return f"{type(constraint).__name__} changes who is joined to whom"
         for controller in self.controllers:
             for name, values in controller.memory.items():
                 if np.asarray(values).dtype.kind not in "biuf":
@@ -325,6 +323,9 @@ class Simulation:
             "deaths": dict(zip(("ids", "times"), self._deaths.known(), strict=True)),
             "trails": dict(zip(TRAILS, self._stage.trails.known(), strict=True)),
         }
+        groups |= {f"constraint{k}": constraint.state() for k, constraint in enumerate(self.constraints)}
+        if any(constraint.breaks_up for constraint in self.constraints):
+            groups |= torn_state(self.system)
         for k, kin in self._lineage.kin.items():
             groups[f"kin{k}"] = {"ids": kin.ids, "birth": kin.birth, "death": kin.death}
         for k, controller in enumerate(self.controllers):
@@ -359,6 +360,10 @@ class Simulation:
         self._looks, self._speed_limit = (times[2], looks, times[3]), times[4]
         self._looked_at_step = True  # when the run began
         self.system.put_state(groups["particles"])
+        put_torn_state(self.system, groups)
+        for k, constraint in enumerate(self.constraints):
+            if f"constraint{k}" in groups:
+                constraint.put_state(groups[f"constraint{k}"])
         self.system.t = self.t
         self.engine.reference.remember(groups.get("solver", {}), Stats())
         self._deaths = Deaths()

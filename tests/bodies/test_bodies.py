@@ -14,7 +14,7 @@ from pointmass.bodies import BODIES, join
 from pointmass.description import parameters_of
 from pointmass.errors import InvalidInput
 from pointmass.forces import Springs
-from tests.shapes import TETRAHEDRON
+from tests.shapes import CLOUD, TETRAHEDRON
 
 EXAMPLES = {
     "points": {"x": [[0, 0, 0], [1, 2, 3]], "attributes": {"charge": [1.0, -1.0]}},
@@ -24,6 +24,7 @@ EXAMPLES = {
     "jelly": {"counts": (3, 4, 5), "size": (0.2, 0.3, 0.4), "tilt": 20.0, "pinned": "bottom"},
     "net": {"rows": 3, "cols": 4, "size": (1.0, 2.0), "links": 2, "pinned": "top edge"},
     "cloth_from_mesh": {"mesh": TETRAHEDRON, "pinned": "top"},
+    "cloud": {"file": CLOUD, "scale": 2.0},
     "cloth": {"rows": 4, "cols": 5, "size": (1.0, 2.0), "pinned": "top corners"},
     "hair": {"strands": 5, "points": 24, "style": "curly", "jitter": 0.05},
     "snake": {"segments": 5, "amplitude": 0.0},

@@ -27,11 +27,12 @@ RNG = np.random.default_rng(0)
 
 def some_drawables(k: int, n: int) -> tuple[Drawable, ...]:
     corners = RNG.normal(size=(30, 3)).astype(np.float32)
+    pairs, white = np.arange(30, dtype=np.int32).reshape(15, 2), np.ones(4, np.float32)
     return (
         Points(name="particles", version=k, radius=np.float32(0.1), color=RNG.random((n, 4)), glow=True),
-        Points(name="a/b ../c_", version=0, index=np.arange(20), radius=RNG.random(20), color=np.ones(4, np.float32)),
-        Segments(name="..", version=k // 2, pairs=np.arange(40, dtype=np.int32).reshape(20, 2), width=1 / 3),
-        Curves(name="", version=-1, vertices=corners, index=np.arange(30), offsets=np.array([0, 30])),
+        Points(name="a/b ../c_", version=0, vertices=corners, index=np.arange(20), radius=RNG.random(20), color=white),
+        Segments(name="..", version=k, vertices=corners, pairs=pairs, width=1 / 3),
+        Curves(name="", version=-k, vertices=corners, index=np.arange(30), offsets=np.array([0, 30])),
         Triangles(name="__mesh", version=0, vertices=corners, faces=np.zeros((0, 3), np.int32), smooth=False),
         Arrows(name="field", version=k, vertices=corners, vectors=-corners, color=(1.0, math.inf, 0.0, 1.0)),
     )
@@ -239,11 +240,11 @@ def test_what_a_kill_leaves_behind_is_not_seen(tmp_path: Path) -> None:
         (lambda p: (p / "zarr.json").unlink(), "is not a pointmass cache"),
         (lambda p: (p / "zarr.json").write_text("{"), "is not a pointmass cache"),
         (lambda p: (p / "zarr.json").write_text('{"attributes": {"format": "other"}}'), "is not a pointmass cache"),
-        (lambda p: shutil.rmtree(p / "frames"), "is not a pointmass cache"),
+        (lambda p: shutil.rmtree(p / "frames"), "is damaged: run the scene again"),
         (lambda p: shutil.rmtree(p / "frames/000001"), "frame 1 is missing"),
         (
             lambda p: (p / "zarr.json").write_text(
-                (p / "zarr.json").read_text().replace('"version": 1', '"version": 9')
+                (p / "zarr.json").read_text().replace('"version": 2', '"version": 9')
             ),
             "has version 9",
         ),

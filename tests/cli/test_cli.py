@@ -192,7 +192,7 @@ def test_a_divergence_keeps_the_frames_before_it(folder: Path) -> None:
 # -------------------------------------------------------------------------------------------------------------- render
 
 
-@pytest.mark.parametrize("name", ["f.mp4", "f.gif", "f.webm", "f.png"])
+@pytest.mark.parametrize("name", ["f.mp4", "f.gif", "f.webm", "f.mov", "f.png"])
 def test_render_writes_films_and_pictures(folder: Path, name: str) -> None:
     done = pointmass("render", "a.toml", "-o", name, *SMALL)
     assert done.exit_code == 0
@@ -461,7 +461,7 @@ BAD_OPTIONS: list[tuple[str, list[str], str]] = [
     ("unknown", ["--frmes", "3"], "--frmes"),
 ]
 BAD_RENDERS: list[tuple[str, list[str], str]] = [
-    ("suffix", ["-o", "x.mov"], "unknown kind of picture or film '.mov'"),
+    ("suffix", ["-o", "x.avi"], "unknown kind of picture or film '.avi'"),
     ("no suffix", ["-o", "x"], "unknown kind of picture or film ''"),
     ("folder", ["-o", "none/x.mp4"], "there is no folder 'none'"),
     ("is folder", ["-o", "folder.mp4"], "it is a folder"),
@@ -615,12 +615,17 @@ def test_an_interrupt_ends_with_130(folder: Path, monkeypatch: pytest.MonkeyPatc
             raise KeyboardInterrupt
         return frame(self, number, *rest)
 
-    monkeypatch.setattr(pm.Simulation, "frame", interrupted)
-    done = pointmass(*command)
+    with monkeypatch.context() as broken:
+        broken.setattr(pm.Simulation, "frame", interrupted)
+        done = pointmass(*command)
     assert done.exit_code == 130
     if command[0] == "run":
         assert done.stderr == "pointmass: interrupted: 2 frames kept in 'i.zarr'; the same command goes on from there\n"
         assert len(Cache.open("i.zarr")) == 2
     else:
-        assert done.stderr == "pointmass: interrupted: 'i.mp4' was not written\n"
-        assert sorted(p.name for p in folder.iterdir()) == ["a.toml", "bursting.toml"]
+        assert done.stderr == (
+            "pointmass: interrupted: 'i.mp4' was not written; the same command goes on from what is done, which is"
+            " kept in '.i.mp4.zarr'\n"
+        )
+        assert pointmass(*command).exit_code == 0
+        assert sorted(p.name for p in folder.iterdir()) == ["a.toml", "bursting.toml", "i.mp4"]

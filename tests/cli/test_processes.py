@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import random
 import signal
 import subprocess
 import sys
@@ -14,7 +13,6 @@ from pathlib import Path
 import pytest
 
 from pointmass.cache import Cache
-from tests.same import assert_same_frame
 
 COMMAND = [sys.executable, "-m", "pointmass.cli"]
 TWO_THREADS = {"POINTMASS_THREADS": "2"}
@@ -33,44 +31,37 @@ def wait_for_frames(cache: Path, count: int) -> None:
         time.sleep(0.002)
 
 
-def kill_a_run(folder: Path, chance: random.Random) -> None:
-    process = start(folder, "run", "pendulum", "-o", "k.zarr", "--frames", "100000", "--set", "links=2")
-    wait_for_frames(folder / "k.zarr", chance.randrange(1, 6))
-    time.sleep(chance.uniform(0, 0.05))
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="needs a list of processes")
+def test_the_processes_of_a_killed_render_end(tmp_path: Path) -> None:
+    assert start(tmp_path, "run", "pendulum", "-o", "a.zarr", "--frames", "130", "--quiet").wait(timeout=60) == 0
+    film = ["render", "a.zarr", "--size", "96x64", "--quiet", "-o"]
+    process = start(tmp_path, *film, "killed.mp4", "--processes", "2")
+    deadline = time.monotonic() + 60
+    while not list(tmp_path.glob(".killed.mp4.part/*")):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    children = [other for other in processes() if parent(other) == process.pid]
+    assert len(children) >= 2
     process.send_signal(signal.SIGKILL)
     process.communicate()
-    cache = Cache.open(folder / "k.zarr")
-    assert len(cache) >= 1
-    for k, frame in enumerate(cache):
-        assert frame.number == k
-        assert frame.drawables
+    while set(children) & set(processes()):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    for name in ("killed.mp4", "whole.mp4"):
+        assert start(tmp_path, *film, name).wait(timeout=120) == 0
+    assert (tmp_path / "killed.mp4").read_bytes() == (tmp_path / "whole.mp4").read_bytes()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.zarr", "killed.mp4", "whole.mp4"]
 
 
-def test_a_killed_run_leaves_a_whole_cache(tmp_path: Path) -> None:
-    for attempt in range(3):
-        (tmp_path / str(attempt)).mkdir()
-        kill_a_run(tmp_path / str(attempt), random.Random(attempt))
+def processes() -> list[int]:
+    return [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdecimal()]
 
 
-def test_a_killed_run_goes_on_to_the_same_bits(tmp_path: Path) -> None:
-    run = ["run", "pendulum", "--set", "links=2", "--quiet", "-o"]
-    process = start(tmp_path, *run, "k.zarr", "--frames", "100000")
-    wait_for_frames(tmp_path / "k.zarr", 40)  # beyond a checkpoint
-    process.send_signal(signal.SIGKILL)
-    process.communicate()
-    frames = len(Cache.open(tmp_path / "k.zarr")) + 10
-    for name in ("k.zarr", "w.zarr"):
-        assert start(tmp_path, *run, name, "--frames", str(frames)).wait(timeout=120) == 0
-    killed, whole = (Cache.open(tmp_path / name) for name in ("k.zarr", "w.zarr"))
-    for a, b in zip(killed, whole, strict=True):
-        assert_same_frame(a, b)
-
-
-@pytest.mark.full
-def test_two_hundred_killed_runs_leave_whole_caches(tmp_path: Path) -> None:
-    for attempt in range(200):
-        (tmp_path / str(attempt)).mkdir()
-        kill_a_run(tmp_path / str(attempt), random.Random(1000 + attempt))
+def parent(process: int) -> int | None:
+    try:
+        return int(Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[1])
+    except OSError:  # it has ended
+        return None
 
 
 @pytest.mark.parametrize(
@@ -86,17 +77,18 @@ def test_a_signal_keeps_the_frames_and_says_so(tmp_path: Path, number: signal.Si
     assert err == f"pointmass: {word}: {frames} frames kept in 'c.zarr'; the same command goes on from there\n"
 
 
-def test_a_terminated_render_leaves_nothing(tmp_path: Path) -> None:
-    process = start(tmp_path, "render", "pendulum", "-o", "p.mp4", "--frames", "100000", "--json")
-    deadline = time.monotonic() + 60
-    while not list(tmp_path.glob(".pointmass-*/run.zarr/frames/*")):
-        assert time.monotonic() < deadline
-        time.sleep(0.002)
+def test_a_terminated_render_goes_on(tmp_path: Path) -> None:
+    film = ["render", "pendulum", "-o", "p.mp4", "--size", "64x48"]
+    process = start(tmp_path, *film, "--frames", "100000", "--json")
+    wait_for_frames(tmp_path / ".p.mp4.zarr", 3)
     process.send_signal(signal.SIGTERM)
     out, err = process.communicate(timeout=30)
-    assert (process.returncode, err) == (143, "pointmass: terminated: 'p.mp4' was not written\n")
+    goes_on = "the same command goes on from what is done, which is kept in '.p.mp4.zarr'"
+    assert (process.returncode, err) == (143, f"pointmass: terminated: 'p.mp4' was not written; {goes_on}\n")
     assert json.loads(out)["interrupted"] is True
-    assert not list(tmp_path.iterdir())
+    again = start(tmp_path, *film, "--frames", "3")
+    assert "nothing to do" in again.communicate(timeout=60)[1]
+    assert [p.name for p in tmp_path.iterdir()] == ["p.mp4"]
 
 
 def test_threads_change_no_bits(tmp_path: Path) -> None:

@@ -6,16 +6,21 @@ import csv
 import re
 import tracemalloc
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import pointmass as pm
+from pointmass.cache import Cache, record
+from pointmass.cli import main
 from pointmass.export import EXPORTERS, About, export
 from pointmass.frame import Camera, Curves, Frame, Points, Segments, Triangles
 from pointmass.render import write
+from pointmass.render.camera import moved
 
 Read = dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]]  # ids, positions and velocities by number of the frame
 
@@ -266,3 +271,19 @@ def test_a_run_is_exported_while_it_runs(tmp_path: Path) -> None:
     export(scene().simulation().frames(4), tmp_path / "a.npz")
     with np.load(tmp_path / "a.npz") as data:
         assert len(data["count"]) == 4
+
+
+def test_a_camera_that_moves_moves_in_a_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from pxr import Usd, UsdGeom
+
+    turning = Camera(position=(0, 0, 5), target=(0, 0, 0), orbit=90.0)
+    still = scene().changed(camera=replace(turning, orbit=0.0))
+    for name, each in (("turning", scene().changed(camera=turning)), ("still", still)):
+        record(each.simulation(), tmp_path / f"{name}.zarr", 4, 4.0, scene=each)
+        monkeypatch.chdir(tmp_path)
+        assert CliRunner().invoke(main, ["export", f"{name}.zarr", f"{name}.usd", "--quiet"]).exit_code == 0
+        stage = Usd.Stage.Open(f"{name}.usd")
+        camera = UsdGeom.Camera(stage.GetPrimAtPath("/World/camera"))
+        places = [camera.ComputeLocalToWorldTransform(k).ExtractTranslation() for k in range(4)]
+        wanted = [moved(each.camera, frame).position for frame in Cache.open(f"{name}.zarr")]
+        np.testing.assert_allclose(places, wanted, atol=1e-12)

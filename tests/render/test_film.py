@@ -9,7 +9,7 @@ from render_scenes import FRONT, everything, frame, square
 
 from pointmass.errors import InvalidInput
 from pointmass.frame import Points
-from pointmass.render import WRITERS, Style, check_write, image, write
+from pointmass.render import SUFFIXES, Style, check_write, image, write
 
 SIZE = (64, 48)
 
@@ -27,7 +27,7 @@ def decoded(path):
         return stream, pictures
 
 
-@pytest.mark.parametrize("suffix", [".mp4", ".webm"])
+@pytest.mark.parametrize("suffix", [".mp4", ".webm", ".mov"])
 def test_video_comes_back(tmp_path, suffix):
     path = tmp_path / f"film{suffix}"
     calls = []
@@ -85,7 +85,7 @@ def test_png_sequence_is_numbered_by_frame(tmp_path):
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
-@pytest.mark.parametrize("name", ["a.mp4", "a.gif", "a.png", "a_%d.png", "a.webm"])
+@pytest.mark.parametrize("name", ["a.mp4", "a.gif", "a.png", "a.webm", "a.mov"])
 def test_a_film_that_fails_leaves_nothing(tmp_path, error, name):
     def broken():
         yield from film(2)
@@ -145,7 +145,7 @@ def test_what_is_accepted_can_be_written(tmp_path, name, size):
         (tmp_path / name).unlink()
 
 
-@pytest.mark.parametrize("suffix", sorted(WRITERS))
+@pytest.mark.parametrize("suffix", sorted(SUFFIXES))
 def test_no_frames(tmp_path, suffix):
     for frames in ([], iter([])):
         with pytest.raises(InvalidInput, match="no frames"):

@@ -4,6 +4,7 @@ from pointmass.bodies.body import BODIES, Body, join
 from pointmass.bodies.chain import chain
 from pointmass.bodies.cloth import cloth
 from pointmass.bodies.cloth_from_mesh import cloth_from_mesh
+from pointmass.bodies.cloud import cloud
 from pointmass.bodies.fish import fish
 from pointmass.bodies.hair import hair
 from pointmass.bodies.jelly import jelly
@@ -19,6 +20,7 @@ __all__ = [
     "chain",
     "cloth",
     "cloth_from_mesh",
+    "cloud",
     "fish",
     "hair",
     "jelly",

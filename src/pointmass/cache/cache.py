@@ -7,6 +7,7 @@ import math
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from pointmass.cache.checks import check_frame
 from pointmass.cache.drawables import folder_of, read_drawable, write_drawable
 from pointmass.cache.groups import (
     METADATA,
@@ -22,19 +24,21 @@ from pointmass.cache.groups import (
     packed,
     read_attributes,
     read_group,
+    stated_attributes,
     unpacked,
     write_attributes,
     write_group,
 )
 from pointmass.cache.provenance import Making
-from pointmass.errors import InvalidInput, number
+from pointmass.errors import InvalidInput, number, shown
 from pointmass.frame import Camera, Drawable, Frame
+from pointmass.lock import hidden
 
 if TYPE_CHECKING:
     from pointmass.scene import Scene
 
 FORMAT = "pointmass cache"
-VERSION = 1
+VERSION = 2
 CHECKPOINTS = "checkpoints"
 LIBRARIES = ("numpy", "scipy", "numba", "zarr")
 
@@ -98,6 +102,11 @@ class Cache(Sequence[Frame]):
         path = Path(path)
         check_target(path, overwrite)
         attributes = attributes_of(path, scene, fps, camera, making, about)
+        if path.exists():
+            with suppress(InvalidInput):  # it is damaged, or of another version
+                cache = cls.open(path)
+                cache.cut(0, attributes)
+                return cache
         try:
             _make(path, attributes)
         except OSError as error:
@@ -116,19 +125,21 @@ class Cache(Sequence[Frame]):
         path = Path(path)
         if not path.is_dir():
             raise InvalidInput(f"cannot read the cache {str(path)!r}: there is no such folder")
+        stated = stated_attributes(path)
+        if stated.get("format") != FORMAT:
+            raise InvalidInput(f"{str(path)!r} is not a pointmass cache: make one with pointmass run")
+        if stated.get("version") != VERSION:
+            raise InvalidInput(
+                f"the cache {str(path)!r} has version {shown(stated.get('version'))}:"
+                f" this pointmass reads version {VERSION}; run the scene again"
+            )
         try:
             attributes = read_attributes(path)
             numbers = sorted(int(f.name) for f in (path / "frames").iterdir() if f.name.isdecimal())
+            number("fps", attributes["fps"], above=0)
             camera_of(attributes)
-        except (Damaged, OSError, KeyError, TypeError, ValueError):
-            attributes, numbers = {}, []
-        if attributes.get("format") != FORMAT:
-            raise InvalidInput(f"{str(path)!r} is not a pointmass cache: make one with pointmass run")
-        if attributes.get("version") != VERSION:
-            raise InvalidInput(
-                f"the cache {str(path)!r} has version {attributes.get('version')}:"
-                f" this pointmass reads version {VERSION}"
-            )
+        except (Damaged, OSError, KeyError, TypeError, ValueError, AttributeError, RecursionError):
+            raise InvalidInput(f"the cache {str(path)!r} is damaged: run the scene again") from None
         for k, found in enumerate(numbers):
             if k != found:
                 raise InvalidInput(f"the cache {str(path)!r} is damaged: frame {k} is missing; run the scene again")
@@ -143,6 +154,7 @@ class Cache(Sequence[Frame]):
             It cannot be written, such as on a full disk. The frames before it stay.
         """
         attributes = {
+            "place": self._count,
             "number": frame.number,
             "time": packed(frame.time),
             "quantities": {name: packed(value) for name, value in frame.quantities.items()},
@@ -190,7 +202,8 @@ class Cache(Sequence[Frame]):
         for folder in self._checkpoints():
             try:
                 attributes = read_attributes(folder)
-                if attributes["frames"] <= len(self) and attributes["time"] < before:
+                fits = attributes["frames"] <= len(self) and attributes["time"] < before
+                if fits and attributes["step"] == int(folder.name):
                     return read_group(folder)[1]
             except (Damaged, KeyError, TypeError):
                 continue  # an earlier one will do
@@ -209,7 +222,7 @@ class Cache(Sequence[Frame]):
                 self._count -= 1
                 _removed(self._folder(self._count))
             for folder in self._checkpoints():
-                if read_attributes(folder).get("frames", 0) > count:
+                if not _before(folder, count):
                     _removed(folder)
             seen = {folder_of(self.path, *pair) for k in range(count) for pair in self._drawn(k)}
             for folder in (self.path / "drawables").glob("*/*"):
@@ -223,6 +236,10 @@ class Cache(Sequence[Frame]):
         """Have other attributes."""
         write_attributes(self.path, attributes)
         self.attributes = attributes
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process needs: not the drawables that were seen last."""
+        return {**self.__dict__, "_seen": {}}
 
     def __len__(self) -> int:
         return self._count
@@ -255,9 +272,11 @@ class Cache(Sequence[Frame]):
             )
         try:
             attributes, arrays = read_group(self._folder(k))
+            if attributes["place"] != k:
+                raise Damaged("it is another frame")
             drawables = tuple(self._drawable(name, version) for name, version in attributes["drawables"])
             self._seen = {d.name: d for d in drawables}
-            return Frame(
+            frame = Frame(
                 number=attributes["number"],
                 time=unpacked(attributes["time"]),
                 ids=arrays["ids"],
@@ -266,7 +285,9 @@ class Cache(Sequence[Frame]):
                 drawables=drawables,
                 quantities={name: unpacked(value) for name, value in attributes["quantities"].items()},
             )
-        except (Damaged, KeyError, TypeError, ValueError) as error:
+            check_frame(frame)
+            return frame
+        except (Damaged, KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError) as error:
             raise InvalidInput(
                 f"frame {k} of the cache {str(self.path)!r} cannot be read: {error}; run the scene again"
             ) from None
@@ -342,11 +363,7 @@ def check_target(path: Path, overwrite: bool) -> None:
     if not path.parent.is_dir():
         raise InvalidInput(f"cannot write the cache {str(path)!r}: there is no folder {str(path.parent)!r}")
     if path.exists() or path.is_symlink():
-        try:
-            is_cache = read_attributes(path).get("format") == FORMAT
-        except Damaged:
-            is_cache = False
-        if not is_cache:
+        if stated_attributes(path).get("format") != FORMAT:
             raise InvalidInput(f"cannot write the cache {str(path)!r}: something else is there; give another name")
         if not overwrite:
             raise InvalidInput(f"the cache {str(path)!r} is there already: give another name, or overwrite=True")
@@ -356,11 +373,21 @@ def check_target(path: Path, overwrite: bool) -> None:
         raise InvalidInput(f"cannot write into folder {str(path.parent)!r}: {error.strerror}") from None
 
 
+def sweep(path: Path) -> None:
+    """Take away what processes that were killed have left of a cache half written or half removed."""
+    shutil.rmtree(hidden(path, ".new"), ignore_errors=True)
+    for folder in (path / "frames", path / CHECKPOINTS, path / "drawables", *path.glob("drawables/*")):
+        for left in folder.glob(".*"):
+            shutil.rmtree(left, ignore_errors=True)
+
+
 def _make(path: Path, attributes: dict[str, Any]) -> None:
-    """An empty cache, in place of the one that was there."""
-    beside = Path(tempfile.mkdtemp(prefix=f".{path.name[:32]}-", dir=path.parent))
+    """An empty cache, in place of what was there."""
+    beside = hidden(path, ".new")
     try:
+        shutil.rmtree(beside, ignore_errors=True)
         new = beside / "new"
+        beside.mkdir()
         for folder, what in ((new, attributes), (new / "frames", {}), (new / "drawables", {})):
             write_group(folder, what, {})
         if path.exists():
@@ -368,6 +395,14 @@ def _make(path: Path, attributes: dict[str, Any]) -> None:
         new.rename(path)
     finally:
         shutil.rmtree(beside, ignore_errors=True)
+
+
+def _before(checkpoint: Path, count: int) -> bool:
+    """Whether a checkpoint can be read and no more than `count` frames come before it."""
+    try:
+        return int(read_attributes(checkpoint)["frames"]) <= count
+    except (Damaged, KeyError, TypeError, ValueError):
+        return False
 
 
 def _removed(folder: Path) -> None:

@@ -9,6 +9,7 @@ from urllib.parse import quote
 
 import numpy as np
 
+from pointmass.cache.checks import check_fields
 from pointmass.cache.groups import SMALL, Array, Damaged, packed, read_group, unpacked, write_group
 from pointmass.frame import DRAWABLES, Drawable
 
@@ -45,10 +46,16 @@ def read_drawable(root: Path, name: str, version: int) -> Drawable:
     Damaged
         It is missing or damaged.
     """
+    if not isinstance(name, str) or not isinstance(version, int):
+        raise Damaged("its drawables have no names")
     attributes, arrays = read_group(folder_of(root, name, version))
     try:
         kind = DRAWABLES[attributes.pop("kind")]
         values: dict[str, Any] = {key: unpacked(value) for key, value in attributes.items()} | arrays
-        return kind(**values)
+        drawable = kind(**values)
     except (KeyError, TypeError, ValueError) as error:
         raise Damaged(f"drawable {name!r} is damaged ({type(error).__name__})") from None
+    check_fields(drawable)
+    if (drawable.name, drawable.version) != (name, version):
+        raise Damaged(f"drawable {name!r} is another one")
+    return drawable

@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pointmass.cache.cache import Cache, attributes_of, check_target
+from pointmass.cache.cache import Cache, attributes_of, check_target, sweep
 from pointmass.cache.groups import Array
-from pointmass.cache.lock import locked
 from pointmass.cache.provenance import Change, Making
 from pointmass.engine.island import CHECKPOINT
 from pointmass.errors import Diverged, InvalidInput, number, whole_number
 from pointmass.frame import Camera, Frame
+from pointmass.lock import locked
 
 if TYPE_CHECKING:
     from pointmass.scene import Scene
@@ -84,6 +84,7 @@ def record(
     overwrite: bool = False,
     resume: bool = False,
     checkpoints: bool = True,
+    planned: Callable[[Plan], None] | None = None,
     progress: Callable[[int], None] | None = None,
     about: dict[str, Any] | None = None,
 ) -> Cache:
@@ -101,6 +102,7 @@ def record(
         is fresh from it, and goes on from a checkpoint with the bits that it would have had. Frames that an edit of the
         scene can affect are made anew, see `plan`.
     checkpoints : whether states are kept from which a run can go on; each takes about as much room as two frames.
+    planned : called with what is to be done, before anything is, if the run is to `resume`; what it raises ends it.
     progress : called with the number of frames written so far, after each.
     about : what else the cache should know, as it can stand in JSON.
 
@@ -121,10 +123,15 @@ def record(
     if resume and (sim.steps or sim.frames_seen):
         raise InvalidInput(f"resume = True is not allowed for a simulation after {sim.steps} steps: give a fresh one")
     check_target(path, overwrite or resume)
-    with locked(path):
+    with locked(path, "the cache"):
+        sweep(path)
         writer = _Writer(sim, path, fps, scene, camera, overwrite or resume, progress, about or {})
-        if resume and writer.goes_on(plan(path, sim, scene, fps), frames):
-            return writer.flush()
+        if resume:
+            found = plan(path, sim, scene, fps)
+            if planned is not None:
+                planned(found)
+            if writer.goes_on(found, frames):
+                return writer.flush()
         if checkpoints:
             writer.keep_states()
         try:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +13,7 @@ import click
 from pointmass.cli.main import stopped
 from pointmass.cli.options import RunOptions, as_json, load_scene, quiet, run_options
 from pointmass.cli.progress import progress
-from pointmass.cli.render import sample
+from pointmass.cli.render import sample, unfinished
 from pointmass.cli.report import Report, counted
 from pointmass.cli.run import simulated
 from pointmass.errors import Diverged, InvalidInput, unknown
@@ -52,7 +54,7 @@ def command(source: str, output: str, frame: int | None, as_json: bool, quiet: b
     except KeyboardInterrupt as error:
         report.frames, report.interrupted = 0, True
         report.show(as_json, quiet)
-        raise stopped(error, f"{output!r} was not written") from None
+        raise stopped(error, unfinished(path)) from None
     report.show(as_json, quiet)
     if report.diverged is not None:
         raise Diverged(f"{report.diverged}; {output!r} holds the {counted(report.frames)} before it")
@@ -73,17 +75,16 @@ class Way:
 
     def __init__(self, path: Path, frame: int | None) -> None:
         from pointmass.export import EXPORTERS, check_export
-        from pointmass.render import check_write
-        from pointmass.render.film import WRITERS
+        from pointmass.render import SUFFIXES, check_write
 
         self.path, self.frame, self.suffix = path, frame, path.suffix.lower()
-        self.film = self.suffix in WRITERS
+        self.film = self.suffix in SUFFIXES
         if self.film:
             check_write(path)
         elif self.suffix in EXPORTERS:
             check_export(path)
         elif self.suffix != ".html":
-            raise unknown("kind of export", path.suffix, [*EXPORTERS, *WRITERS, ".html"])
+            raise unknown("kind of export", path.suffix, [*EXPORTERS, *SUFFIXES, ".html"])
 
     def check_frame(self, count: int) -> None:
         """Refuse a frame that is not there.
@@ -111,10 +112,15 @@ class Way:
 
     def _file(self, frames: Sequence[Frame], cache: Cache, tick: Tick) -> None:
         from pointmass.export import About, export
-        from pointmass.render import fit_camera
 
-        camera = fit_camera(sample(cache), cache.camera) if self.suffix.startswith(".usd") and len(cache) else None
-        export(frames, self.path, tick, About(fps=cache.fps, name=cache.attributes["name"], camera=camera))
+        about = About(fps=cache.fps, name=cache.attributes["name"])
+        if self.suffix.startswith(".usd") and len(cache):
+            from pointmass.render import fit_camera
+            from pointmass.render.camera import moved, moves
+
+            camera = fit_camera(sample(cache), cache.camera)
+            about = replace(about, camera=camera, moved=partial(moved, camera) if moves(camera) else None)
+        export(frames, self.path, tick, about)
 
     def _page(self, frames: Sequence[Frame], cache: Cache, tick: Tick) -> None:
         from pointmass.viewer.film import to_html
@@ -126,4 +132,4 @@ class Way:
         from pointmass.render import fit_camera, write
 
         camera = fit_camera(sample(cache), cache.camera) if len(cache) else None
-        write(iter(frames), self.path, fps=cache.fps, camera=camera, progress=tick)
+        write(frames, self.path, fps=cache.fps, camera=camera, progress=tick)

@@ -17,6 +17,7 @@ from typing import Any, NoReturn
 import click
 
 from pointmass import __version__
+from pointmass.cli.memory import add_allow_large, limited, memory_sentence
 from pointmass.errors import Diverged, PointmassError
 
 DONE, BAD_INPUT, DIVERGED = 0, 2, 3
@@ -62,7 +63,7 @@ class Commands(click.Group):
         if cmd_name not in COMMANDS:
             return None
         command: click.Command = import_module(f"pointmass.cli.{COMMANDS[cmd_name]}").command
-        return command
+        return add_allow_large(command)
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
@@ -75,7 +76,7 @@ class Commands(click.Group):
 
     def main(self, args: Sequence[str] | None = None, *_: Any, **options: Any) -> NoReturn:
         try:
-            with _sigterm_raises():
+            with _sigterm_raises(), limited():
                 code = super().main(args, "pointmass", standalone_mode=False)
         except click.ClickException as error:
             code = error.code if isinstance(error, Ended) else BAD_INPUT
@@ -117,7 +118,7 @@ def ending(error: BaseException) -> tuple[int, str]:
         error = error if isinstance(error, Interrupted) else Interrupted()
         return error.code, str(error) or error.word
     if isinstance(error, MemoryError):
-        return BAD_INPUT, f"there is not enough memory: {error or 'take fewer particles or a smaller picture'}"
+        return BAD_INPUT, memory_sentence(error)
     return BAD_INPUT, str(error)
 
 

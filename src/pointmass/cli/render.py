@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import click
 
@@ -22,7 +22,7 @@ from pointmass.cli.options import (
 )
 from pointmass.cli.progress import progress
 from pointmass.cli.report import Report, counted
-from pointmass.cli.run import simulated
+from pointmass.cli.run import simulated, simulated_at
 from pointmass.engine.threads import use_threads
 from pointmass.errors import Diverged, InvalidInput, number
 
@@ -37,10 +37,13 @@ SAMPLES = 48  # frames that an automatic camera looks at
 @click.command("render")
 @click.argument("source", metavar="SCENE|CACHE")
 @click.option(
-    "-o", "--output", help="A film (.mp4, .webm, .gif) or picture (.png, x_%04d.png); <scene>.mp4 by default."
+    "-o", "--output", help="A film (.mp4, .webm, .mov, .gif) or picture (.png, x_%04d.png); <scene>.mp4 by default."
 )
 @click.option("--frame", type=int, help="For a .png: the number of the frame, counted from 0; the last by default.")
 @click.option("--size", default="1280x720", show_default=True, help="Width and height [pixels].")
+@click.option("--processes", type=int, default=1, show_default=True, help="Processes that draw a film.")
+@click.option("--transparent", is_flag=True, help="No background: a .png, .webm or .mov with an alpha.")
+@click.option("--shutter", type=float, help="Exposure time, for motion blur [s].")
 @click.option("--caption", is_flag=True, help="Write time and energy into the picture.")
 @click.option("--azimuth", type=float, help="Direction from which the camera looks [degrees].")
 @click.option("--elevation", type=float, help="Likewise, above the horizon [degrees].")
@@ -58,6 +61,9 @@ def command(
     output: str | None,
     frame: int | None,
     size: str,
+    processes: int,
+    transparent: bool,
+    shutter: float | None,
     caption: bool,
     azimuth: float | None,
     elevation: float | None,
@@ -71,12 +77,17 @@ def command(
     quiet: bool,
     **values: Any,
 ) -> None:
-    """Make a film or a picture of a scene, or of a cache."""
+    """Make a film or a picture of a scene, or of a cache.
+
+    What is killed or interrupted goes on with the same command, from the pictures that are done: a film's parts stay in
+    a hidden folder beside it until it is complete.
+    """
     options = RunOptions(**values)
     path = Path(output) if output is not None else default_output(source, ".mp4")
     report = Report(command="render", path=path)
     view = {"azimuth": azimuth, "elevation": elevation, "fov": fov, "orbit": orbit, "dolly": dolly}
-    drawing = Drawing(path, parse_size(size), frame, (first, last), caption, view, follow, quiet)
+    style = {"caption": caption, "transparent": transparent, "shutter": shutter}
+    drawing = Drawing(path, parse_size(size), frame, (first, last), style, processes, view, follow, quiet)
     if Path(source).is_file() and path.exists() and path.samefile(source):
         raise InvalidInput(f"cannot write {str(path)!r}: it is the scene itself")
     try:
@@ -87,7 +98,7 @@ def command(
     except KeyboardInterrupt as error:
         report.frames, report.interrupted = 0, True
         report.show(as_json, quiet)
-        raise stopped(error, f"{str(path)!r} was not written") from None
+        raise stopped(error, unfinished(path)) from None
     report.show(as_json, quiet)
     if report.diverged is not None:
         raise Diverged(f"{report.diverged}; {str(path)!r} holds the {counted(report.frames)} before it")
@@ -102,14 +113,17 @@ class Drawing:
         size: tuple[int, int],
         frame: int | None,
         part: tuple[int | None, int | None],
-        caption: bool,
+        style: dict[str, Any],
+        processes: int,
         view: dict[str, float | None],
         follow: int | None,
         quiet: bool,
     ) -> None:
+        from pointmass.render import Style
         from pointmass.render.film import is_single
 
-        self.path, self.size, self.frame, self.caption, self.quiet = path, size, frame, caption, quiet
+        self.path, self.size, self.frame, self.quiet = path, size, frame, quiet
+        self.style, self.processes = Style(**style), processes
         self.part, self.follow = part, follow
         self.view = {name: number(name, v, unit=UNITS[name]) for name, v in view.items() if v is not None}
         self.single = is_single(path)
@@ -124,7 +138,7 @@ class Drawing:
         """
         from pointmass.render import check_write
 
-        check_write(self.path, fps=fps, size=self.size)
+        check_write(self.path, fps=fps, size=self.size, style=self.style, processes=self.processes)
         self.camera_with(camera)
         if self.frame is not None and not self.single:
             raise InvalidInput(f"--frame belongs to a single picture such as x.png, not to {self.path.name!r}")
@@ -154,18 +168,50 @@ class Drawing:
 
     def draw(self, cache: Cache) -> int:
         """Draw the frames of a cache; returns how many."""
-        from pointmass.render import Style, fit_camera, write
+        from pointmass.render import fit_camera, write
 
         camera = fit_camera(sample(cache), self.camera_with(cache.camera), self.size)
         numbers: Sequence[int] = self._numbers(len(cache))
         if self.single:
             numbers = [len(cache) - 1 if self.frame is None else self.frame]
-        frames: Iterator[Frame] = (cache[k] for k in numbers)
-        total = len(numbers)
-        style = Style(caption=self.caption)
-        with compiling_said(self.quiet), progress("rendering", total, self.quiet) as tick:
-            write(frames, self.path, fps=cache.fps, camera=camera, size=self.size, style=style, progress=tick)
-        return total
+        with compiling_said(self.quiet), progress("rendering", len(numbers), self.quiet) as tick:
+            write(
+                Selected(cache, numbers),
+                self.path,
+                fps=cache.fps,
+                camera=camera,
+                size=self.size,
+                style=self.style,
+                progress=tick,
+                processes=self.processes,
+            )
+        return len(numbers)
+
+
+class Selected(Sequence["Frame"]):
+    """Some frames of a cache, each of which is read when it is asked for."""
+
+    def __init__(self, cache: Cache, numbers: Sequence[int]) -> None:
+        self._cache, self._numbers = cache, numbers
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    @overload
+    def __getitem__(self, k: int) -> Frame: ...
+    @overload
+    def __getitem__(self, k: slice) -> Selected: ...
+    def __getitem__(self, k: int | slice) -> Frame | Selected:
+        return Selected(self._cache, self._numbers[k]) if isinstance(k, slice) else self._cache[self._numbers[k]]
+
+
+def unfinished(path: Path) -> str:
+    """What an interrupt leaves of a file."""
+    from pointmass.render.film import kept_at
+
+    kept = " and ".join(repr(str(place)) for place in (simulated_at(path), kept_at(path)) if place.exists())
+    said = f"{str(path)!r} was not written"
+    return f"{said}; the same command goes on from what is done, which is kept in {kept}" if kept else said
 
 
 def _from_cache(source: str, options: RunOptions, drawing: Drawing, report: Report) -> None:

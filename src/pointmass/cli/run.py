@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from pointmass.beside import take_away
 from pointmass.cli.compiling import laws_said, warnings_said
 from pointmass.cli.main import stopped
 from pointmass.cli.options import RunOptions, as_json, default_output, load_scene, quiet, run_options
 from pointmass.cli.progress import progress
 from pointmass.cli.report import Report, counted
-from pointmass.errors import Diverged, InvalidInput
+from pointmass.errors import Diverged, InvalidInput, PointmassError
+from pointmass.lock import hidden, locked
 
 if TYPE_CHECKING:
     from pointmass.cache import Cache, Plan
@@ -76,7 +78,6 @@ def simulate(
     quiet: bool,
     *,
     mode: Mode = "",
-    checkpoints: bool = True,
     about: dict[str, Any] | None = None,
 ) -> None:
     """Simulate a scene into a cache, and count its frames in the report.
@@ -84,7 +85,6 @@ def simulate(
     Parameters
     ----------
     mode : "resume" refuses a cache of another scene, "anew" replaces one, "" keeps of it what still holds.
-    checkpoints : whether it is kept from where a run can go on.
     about : what else the cache should know.
 
     Raises
@@ -92,37 +92,39 @@ def simulate(
     InvalidInput
         There is nothing to resume.
     """
-    from pointmass.cache import check_target, plan, record
+    from pointmass.cache import check_target, record
 
     check_target(path, overwrite=True)
+    untold: Plan | None = None  # of another scene it is not known before that it can run at all
     with warnings_said(quiet), laws_said(quiet), progress("simulating", scene.frames, quiet) as tick:
-        sim = scene.simulation()
-        found = plan(path, sim, scene, scene.fps)
-        if mode == "resume" and not found.same:
-            raise InvalidInput(_no_resume(found, path))
-        report.frames = found.kept if mode != "anew" else 0
-        untold = mode != "anew" and not quiet
-        if untold and found.same:
-            _say(found, path, scene.frames)
-            untold = False
+
+        def planned(found: Plan) -> None:
+            nonlocal untold
+            if mode == "resume" and not found.same:
+                raise InvalidInput(_no_resume(found, path))
+            report.frames = found.kept
+            if found.same and not quiet:
+                _say(found, path, scene.frames)
+            elif not quiet:
+                untold = found
 
         def count(frames: int) -> None:
             nonlocal untold
-            if untold:  # of another scene it is not known before that it can run at all
-                _say(found, path, scene.frames)
-                untold = False
+            if untold is not None:
+                _say(untold, path, scene.frames)
+                untold = None
             report.frames = frames
             tick(frames)
 
         record(
-            sim,
+            scene.simulation(),
             path,
             scene.frames,
             scene.fps,
             scene=scene,
             overwrite=True,
             resume=mode != "anew",
-            checkpoints=checkpoints,
+            planned=planned,
             progress=count,
             about=about,
         )
@@ -150,9 +152,10 @@ def _no_resume(found: Plan, path: Path) -> str:
 
 @contextmanager
 def simulated(scene: Scene, output: Path, report: Report, quiet: bool) -> Iterator[Cache]:
-    """A scene in a cache beside the output that is made of it; the cache goes in the end.
+    """A scene in a hidden cache beside the output that is made of it; the cache goes in the end.
 
-    Of a run that diverges it holds the frames before, and the report says so.
+    What is killed or interrupted leaves it there, and the same command goes on from it. Of a run that diverges it holds
+    the frames before, and the report says so.
 
     Raises
     ------
@@ -161,15 +164,26 @@ def simulated(scene: Scene, output: Path, report: Report, quiet: bool) -> Iterat
     """
     from pointmass.cache import Cache
 
-    with tempfile.TemporaryDirectory(prefix=".pointmass-", dir=output.parent, ignore_cleanup_errors=True) as folder:
-        path = Path(folder) / "run.zarr"
+    path, gone = simulated_at(output), hidden(output, ".gone")
+    with locked(output, ending=".run.lock"):
+        shutil.rmtree(gone, ignore_errors=True)
         try:
-            simulate(scene, path, report, quiet, checkpoints=False)
-        except Diverged as error:
-            report.diverged = error
-            if not report.frames:
-                raise Diverged(f"{error}; {str(output)!r} was not written") from error
-        yield Cache.open(path)
+            try:
+                simulate(scene, path, report, quiet)
+            except Diverged as error:
+                report.diverged = error
+                if not report.frames:
+                    raise Diverged(f"{error}; {str(output)!r} was not written") from error
+            yield Cache.open(path)
+        except PointmassError:
+            take_away(path, gone)
+            raise
+        take_away(path, gone)
+
+
+def simulated_at(output: Path) -> Path:
+    """Where the cache is of which an output is made."""
+    return hidden(output, ".zarr")
 
 
 def _kept(error: Exception, report: Report) -> str:

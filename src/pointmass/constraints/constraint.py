@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +71,13 @@ class Constraint(Described):
 
     def forget(self) -> None:
         """Remember nothing of earlier steps: called on a fixed grid of steps, so that a run can go on from there."""
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """What it still remembers of earlier steps, as arrays by name: see `Simulation.state`."""
+        return {}
+
+    def put_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Remember what a `state` says."""
 
     def enforce(self, system: ParticleSystem, step: Step) -> None:
         """Move the particles of `system` from where a step left them to where they may be, in place.

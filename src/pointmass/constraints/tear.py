@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -102,6 +105,12 @@ class Tear(Constraint):
                     f"{force.called} has a number for each particle, and there are more when something tears: make it "
                     "an attribute of the particles and give its name"
                 )
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        return {"breaks": np.array([self.breaks]), "fresh": self._fresh}
+
+    def put_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        self.breaks, self._fresh = int(state["breaks"][0]), np.array(state["fresh"], np.int64)
 
     def enforce(self, system: ParticleSystem, step: Step) -> None:
         p = system.particles

@@ -20,11 +20,13 @@ class About:
     fps : frames per second of simulated time.
     name : of the run.
     camera : that looks at it; one without a position or a target is left out.
+    moved : the camera at the time of a frame, if it moves.
     """
 
     fps: float = 60.0
     name: str = "run"
     camera: Camera | None = None
+    moved: Callable[[Frame], Camera] | None = None
 
 
 Write = Callable[[Iterable[Frame], Path, About], None]

@@ -55,8 +55,7 @@ def _write(frames: Iterable[Frame], path: Path, about: About) -> None:
     stage.SetTimeCodesPerSecond(about.fps)
     stage.SetFramesPerSecond(about.fps)
     stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/World").GetPrim())
-    if about.camera is not None:
-        _camera(stage, about.camera)
+    place = None if about.camera is None else _camera(stage, about.camera)
     prims: dict[tuple[str, str], _Prim] = {}
     unsaved = 0
     for k, frame in enumerate(frames):
@@ -64,6 +63,8 @@ def _write(frames: Iterable[Frame], path: Path, about: About) -> None:
             stage.SetStartTimeCode(frame.number)
         stage.SetEndTimeCode(frame.number)
         _add(stage, prims, frame)
+        if place is not None and about.moved is not None:
+            place.Set(_placed(about.moved(frame)), frame.number)
         unsaved += len(frame.ids)
         if unsaved >= SAVED_AFTER:
             stage.GetRootLayer().Save()
@@ -284,15 +285,26 @@ def _colored(color: Any, n: int) -> dict[str, Array]:
     return {"displayColor": _single(light[:, :3]), "displayOpacity": _single(light[:, 3])}
 
 
-def _camera(stage: Any, camera: Camera) -> None:
+def _camera(stage: Any, camera: Camera) -> Any:
+    """Add a camera; returns where it says its place, None if that is not known."""
     from pxr import Gf, UsdGeom
 
     if camera.position is None or camera.target is None:
-        return
+        return None
     prim = UsdGeom.Camera.Define(stage, "/World/camera")
-    look = Gf.Matrix4d().SetLookAt(Gf.Vec3d(*camera.position), Gf.Vec3d(*camera.target), Gf.Vec3d(*camera.up))
-    prim.AddTransformOp().Set(look.GetInverse())
+    place = prim.AddTransformOp()
+    place.Set(_placed(camera))
     prim.GetVerticalApertureAttr().Set(APERTURE)
     prim.GetHorizontalApertureAttr().Set(APERTURE * WIDE)
     prim.GetFocalLengthAttr().Set(APERTURE / (2 * math.tan(math.radians(camera.fov) / 2)))
     prim.GetClippingRangeAttr().Set(Gf.Vec2f(0.01, 1e5))
+    return place
+
+
+def _placed(camera: Camera) -> Any:
+    """The matrix from a camera to the world."""
+    from pxr import Gf
+
+    eye, target, up = (Gf.Vec3d(*vector) for vector in (camera.position or (), camera.target or (), camera.up))
+    look = Gf.Matrix4d().SetLookAt(eye, target, up)
+    return look.GetInverse()

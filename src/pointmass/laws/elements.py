@@ -7,7 +7,7 @@ sum has the same bits on any number of threads.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -18,7 +18,7 @@ from pointmass.errors import InvalidInput, whole_number
 from pointmass.laws.force import Array, Blocks, Force, Rows, clock, inputs_for, matrix
 from pointmass.laws.parameter import Parameter
 from pointmass.laws.unary import law_name, law_parameters, origin, parameters_from
-from pointmass.particles import Particles
+from pointmass.particles import Particles, read_only
 from pointmass.tracing import functions as fn
 from pointmass.tracing.derivative import gradient
 from pointmass.tracing.program import flatten
@@ -188,6 +188,18 @@ class ElementForce(Force):
             p.keep(source)
             if name in self.divided:
                 p.scale(share)
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Its elements and the numbers of each, which change where something tears: see `Simulation.state`."""
+        columns = {f"{name}.{k}": c.value for name, p in self.parameters.items() for k, c in enumerate(p.components)}
+        return {"ids": self.ids, **{key: value for key, value in columns.items() if isinstance(value, np.ndarray)}}
+
+    def put_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Have the elements of a `state` of the same force."""
+        self.ids, self._rows = np.array(state["ids"], np.int64), None
+        for key in state.keys() - {"ids"}:
+            name, _, k = key.rpartition(".")
+            self.parameters[name].components[int(k)].value = read_only(np.array(state[key], np.float64))
 
     def shifted(self, offset: int) -> ElementForce:
         """Name particles `offset` higher: for bodies that are put together. Returns itself."""

@@ -80,7 +80,7 @@ def moved(camera: Camera, frame: Frame) -> Camera:
 
     It depends on nothing but the frame, so that films can be made in parts.
     """
-    if not (len(camera.path) or camera.dolly or camera.orbit or camera.follow is not None):
+    if not moves(camera):
         return camera
     eye, target = np.array(camera.position, np.float64), np.array(camera.target, np.float64)
     if len(camera.path):
@@ -97,6 +97,11 @@ def moved(camera: Camera, frame: Frame) -> Camera:
     if len(rows) and np.isfinite(frame.positions[rows[0]]).all():
         target = frame.positions[rows[0]].astype(np.float64)
     return replace(camera, position=_triple(target + offset), target=_triple(target))
+
+
+def moves(camera: Camera) -> bool:
+    """Whether a camera is elsewhere at another time."""
+    return bool(len(camera.path) or camera.dolly or camera.orbit or camera.follow is not None)
 
 
 def _on_path(rows: Vector, time: float) -> tuple[Vector, Vector]:

@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from pointmass.colors import srgb
 from pointmass.errors import InvalidInput
 from pointmass.frame import Arrows, Camera, Curves, Drawable, Frame, Points, Segments
+from pointmass.render.alpha import BLACK, WHITE, before, covered, with_alpha
 from pointmass.render.balls import EMPTY as NO_BALLS
 from pointmass.render.balls import balls
 from pointmass.render.bands import each
+from pointmass.render.blur import exposed
 from pointmass.render.camera import View, fit_camera, look, moved
 from pointmass.render.capsules import EMPTY as NO_CAPSULES
 from pointmass.render.capsules import arrows, curves, segments, streaks
@@ -57,7 +59,8 @@ def image(
 
     Returns
     -------
-    array : sRGB bytes, shape (height, width, 3).
+    array : sRGB bytes, shape (height, width, 3); of a transparent style (height, width, 4), the colour not multiplied
+        by the alpha.
 
     Raises
     ------
@@ -66,8 +69,14 @@ def image(
     size = checked_size(size)
     style = style or Style()
     camera = moved(fit_camera([frame], camera, size), frame)
-    light, spill = _light(frame, camera, look(camera, size), style)
-    picture = _develop(light, spill, style)
+    view = look(camera, size)
+    if style.shutter is not None:
+        frame = exposed(frame, style.shutter)
+    if style.transparent:
+        (light, spill), (over_white, _) = (_light(frame, camera, view, before(style, g)) for g in (BLACK, WHITE))
+        picture = with_alpha(_develop(light, spill, style), covered(light, over_white))
+    else:
+        picture = _develop(*_light(frame, camera, view, style), style)
     if style.caption:
         from pointmass.render.caption import caption
 

@@ -26,6 +26,10 @@ class Style:
     bloom : how much of what is brighter than white spills around it (0 = none).
     shadows : whether solid things throw shadows.
     caption : write the time and the energy into the lower left corner.
+    shutter : exposure time [s]: particles are smeared along the way that they went at their speed meanwhile, 0 = a
+        moment; None = as the frames say, see `Look.shutter`.
+    transparent : no background: pictures have an alpha, and look over black as they do without. What glows lies over
+        other things as light does. Two pictures are drawn for one.
 
     Raises
     ------
@@ -42,12 +46,16 @@ class Style:
     bloom: float = 0.6
     shadows: bool = True
     caption: bool = False
+    shutter: float | None = None
+    transparent: bool = False
 
     def __post_init__(self) -> None:
         number("style.exposure", self.exposure, above=0.0)
         number("style.ambient", self.ambient, at_least=0.0)
         number("style.pool", self.pool, at_least=0.0)
         number("style.bloom", self.bloom, at_least=0.0)
+        if self.shutter is not None:
+            number("style.shutter", self.shutter, at_least=0.0, unit="s")
         if whole_number("style.samples", self.samples, at_least=1) > 4:
             raise InvalidInput(f"style.samples = {self.samples} is not allowed: it must be 1, 2, 3 or 4")
         for name in ("bottom", "top", "light"):

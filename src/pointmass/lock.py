@@ -1,7 +1,8 @@
-"""One process at a time writes a cache."""
+"""One process at a time writes a cache or a file."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -10,31 +11,40 @@ from typing import Any
 
 from pointmass.errors import InvalidInput
 
+LONGEST = 48  # letters of a name that hidden ones keep
 FAR = 2**30  # where Windows locks a byte: whoever asks may still read the number of the process
 
 
 @contextmanager
-def locked(path: Path) -> Iterator[None]:
-    """Inside, no other process writes to the cache at a path.
+def locked(path: Path, what: str = "", ending: str = ".lock") -> Iterator[None]:
+    """Inside, no other process writes to a path.
 
-    The system forgets the lock when the process ends, however it ends.
+    The system forgets the lock when the process ends, however it ends; the small file that a killed one leaves behind
+    hinders nobody, and goes with the next lock.
+
+    Parameters
+    ----------
+    path : of what is written.
+    what : it is, for people, such as "the cache".
+    ending : of the lock's name; those of other names are other locks.
 
     Raises
     ------
     InvalidInput
-        Another one does, or nothing can be written there.
+        Another process does, or nothing can be written there.
     """
-    place = path.with_name(f".{path.name}.lock")
+    named = f"{what} {str(path)!r}".lstrip()
+    place = hidden(path, ending)
     try:
         descriptor = _taken(place)
     except OSError as error:
-        raise InvalidInput(f"cannot write the cache {str(path)!r}: {error.strerror}") from None
+        raise InvalidInput(f"cannot write {named}: {error.strerror}") from None
     if descriptor is None:
+        who = ""
         with suppress(OSError):
             who = place.read_text(encoding="ascii").strip()
         raise InvalidInput(
-            f"the cache {str(path)!r} is being written by process {who or 'unknown'}: wait for its end, or give another"
-            " name"
+            f"{named} is being written by process {who or 'unknown'}: wait for its end, or give another name"
         )
     try:
         os.truncate(descriptor, 0)
@@ -44,6 +54,19 @@ def locked(path: Path) -> Iterator[None]:
         with suppress(OSError):
             place.unlink()
         os.close(descriptor)
+
+
+def hidden(path: Path, ending: str) -> Path:
+    """A hidden name beside a path, the same whenever it is asked for, so that what a killed process leaves is found.
+
+    Parameters
+    ----------
+    ending : of the name, such as ".lock".
+    """
+    name = path.name
+    if len(name) > LONGEST:
+        name = f"{name[:LONGEST]}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+    return path.with_name(f".{name.replace('%', '_')}{ending}")
 
 
 def _taken(place: Path) -> int | None:
