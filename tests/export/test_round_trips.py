@@ -17,6 +17,7 @@ from click.testing import CliRunner
 import pointmass as pm
 from pointmass.cache import Cache, record
 from pointmass.cli import main
+from pointmass.errors import InvalidInput
 from pointmass.export import EXPORTERS, About, export
 from pointmass.frame import Camera, Curves, Frame, Points, Segments, Triangles
 from pointmass.render import write
@@ -85,6 +86,27 @@ def read_vtk(path: Path) -> Read:
     return result
 
 
+def read_vtkhdf(path: Path) -> Read:
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOHDF import vtkHDFReader
+
+    reader = vtkHDFReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    result: Read = {}
+    for k in range(reader.GetNumberOfSteps()):
+        reader.SetStep(k)
+        reader.Update()
+        mesh = reader.GetOutput()
+        columns = [
+            mesh.GetPointData().GetArray("id"),
+            mesh.GetPoints().GetData(),
+            mesh.GetPointData().GetArray("velocity"),
+        ]
+        result[k] = tuple(vtk_to_numpy(column).copy() for column in columns)  # type: ignore[assignment]
+    return result
+
+
 def read_gsd(path: Path) -> Read:
     import gsd.hoomd
 
@@ -113,6 +135,7 @@ FORMATS: list[tuple[str, Callable[[Path], Read], float]] = [
     ("a.csv", read_csv, EXACT),
     ("a_%03d.ply", read_ply, EXACT),
     ("a.pvd", read_vtk, EXACT),
+    ("a.vtkhdf", read_vtkhdf, EXACT),
     ("a.usd", read_usd, SINGLE),
     ("a.usda", read_usd, SINGLE),
     ("a.gsd", read_gsd, SINGLE),
@@ -123,7 +146,8 @@ FORMATS: list[tuple[str, Callable[[Path], Read], float]] = [
 def test_ids_places_and_velocities_come_back(
     tmp_path: Path, frames: list[Frame], name: str, read: Callable[[Path], Read], precision: float
 ) -> None:
-    export(iter(frames), tmp_path / name)
+    ahead = EXPORTERS[Path(name).suffix].ahead
+    export(frames if ahead else iter(frames), tmp_path / name)
     found = read(tmp_path / name)
     assert sorted(found) == [frame.number for frame in frames]
     for frame in frames:
@@ -150,6 +174,38 @@ def test_a_frame_may_be_empty(tmp_path: Path, name: str, read: Callable[[Path], 
 def test_every_kind_of_all_frames_is_read_back() -> None:
     tried = {Path(name).suffix for name, *_ in FORMATS} | {".usdc", ".vtp", ".obj", ".glb"}  # as .usd and .pvd; meshes
     assert tried == set(EXPORTERS)
+
+
+def test_what_begins_with_all_times_wants_a_sequence_and_passes_on_what_goes_wrong(
+    tmp_path: Path, frames: list[Frame]
+) -> None:
+    from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
+    from vtkmodules.vtkIOHDF import vtkHDFReader
+
+    with pytest.raises(InvalidInput, match=r"a \.vtkhdf file begins with the times of all its frames: record a cache"):
+        export(iter(frames), tmp_path / "a.vtkhdf")
+
+    class Broken(list[Frame]):
+        passes = 0
+
+        def __iter__(self) -> Iterator[Frame]:
+            self.passes += 1
+            yield from self[:2]
+            if self.passes > 1:
+                raise InvalidInput("frame 2 cannot be read")
+            yield self[2]
+
+    with pytest.raises(InvalidInput, match="frame 2 cannot be read"):
+        export(Broken(frames[:3]), tmp_path / "a.vtkhdf")
+    assert not list(tmp_path.iterdir())
+    counts: list[int] = []
+    export(frames, tmp_path / "a.vtkhdf", progress=counts.append)
+    assert counts == list(range(1, 13))
+    reader = vtkHDFReader()
+    reader.SetFileName(str(tmp_path / "a.vtkhdf"))
+    reader.UpdateInformation()
+    times = reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS())
+    assert times == pytest.approx([frame.time for frame in frames], rel=1e-6)
 
 
 def test_the_stage_has_meshes_curves_shapes_and_a_camera(tmp_path: Path, frames: list[Frame]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from pointmass.beside import beside, check_place
@@ -14,6 +15,7 @@ from pointmass.export.npz import write_npz
 from pointmass.export.ply import write_ply
 from pointmass.export.table import write_csv
 from pointmass.export.usd import write_usd
+from pointmass.export.vtkhdf import write_vtkhdf
 from pointmass.export.vtp import write_pvd, write_vtp
 from pointmass.frame import Frame
 from pointmass.sequences import is_sequence
@@ -27,6 +29,7 @@ EXPORTERS: dict[str, Exporter] = {
     ".usdc": Exporter(write=write_usd, needs=USD),
     ".usda": Exporter(write=write_usd, needs=USD),
     ".pvd": Exporter(write=write_pvd, needs=VTK),
+    ".vtkhdf": Exporter(write=write_vtkhdf, ahead=True, needs=VTK),
     ".vtp": Exporter(write=write_vtp, needs=VTK, still=True),
     ".gsd": Exporter(write=write_gsd, needs=GSD),
     ".ply": Exporter(write=write_ply, still=True),
@@ -67,15 +70,16 @@ def export(
     Parameters
     ----------
     frames : such as a cache, or `sim.frames(240)` while it runs; each is read once and then let go.
-    path : `.npz`, `.csv`, `.usd`, `.pvd`, `.gsd`: all frames; `.vtp`, `.ply`, `.obj`, `.glb`: the last one. A name such
-        as `x_%04d.ply` makes a file of any kind for each frame.
+    path : `.npz`, `.csv`, `.usd`, `.pvd`, `.vtkhdf`, `.gsd`: all frames; `.vtp`, `.ply`, `.obj`, `.glb`: the last one.
+        A name such as `x_%04d.ply` makes a file of any kind for each frame.
     progress : called with the number of frames written so far.
     about : what frames do not say: the frame rate and the camera, which `.usd` keeps.
 
     Raises
     ------
     InvalidInput
-        The suffix is not known, its library is not installed, there are no frames, or the file cannot be written.
+        The suffix is not known, its library is not installed, there are no frames, or the file cannot be written; or
+        it is a `.vtkhdf`, and the frames are not a sequence, such as a cache or a list.
 
     Examples
     --------
@@ -86,11 +90,13 @@ def export(
     about = about or About(name=path.stem)
     if exporter.still and not is_sequence(path):
         frames = _last(frames)
+    if exporter.ahead and not is_sequence(path):
+        about = replace(about, times=_times(frames, path.suffix))
     with beside(path) as part:
         counted = _counted(frames, progress)
         if is_sequence(path):
             for frame in counted:
-                exporter.write([frame], part.with_name(part.name % frame.number), about)
+                exporter.write([frame], part.with_name(part.name % frame.number), replace(about, times=(frame.time,)))
         else:
             exporter.write(counted, part, about)
 
@@ -102,6 +108,12 @@ def _last(frames: Iterable[Frame]) -> list[Frame]:
     for frame in frames:
         last = [frame]
     return last
+
+
+def _times(frames: Iterable[Frame], suffix: str) -> tuple[float, ...]:
+    if not isinstance(frames, Sequence):
+        raise InvalidInput(f"a {suffix} file begins with the times of all its frames: record a cache, and export that")
+    return tuple(frame.time for frame in frames)
 
 
 def _counted(frames: Iterable[Frame], progress: Callable[[int], None] | None) -> Iterator[Frame]:

@@ -21,12 +21,14 @@ class About:
     name : of the run.
     camera : that looks at it; one without a position or a target is left out.
     moved : the camera at the time of a frame, if it moves.
+    times : of all frames [s], where a file begins with them (`Exporter.ahead`).
     """
 
     fps: float = 60.0
     name: str = "run"
     camera: Camera | None = None
     moved: Callable[[Frame], Camera] | None = None
+    times: tuple[float, ...] = ()
 
 
 Write = Callable[[Iterable[Frame], Path, About], None]
@@ -41,11 +43,13 @@ class Exporter:
     write : takes frames, each once and one at a time, so that a run of any length fits into memory; the path of a
         file, in a folder of its own that may hold others beside it in the end; and what there is to know of the run.
     still : whether a file holds one frame.
+    ahead : whether it must know the times of all frames before it takes the first.
     needs : the module without which it cannot, and what to install for it.
     """
 
     write: Write
     still: bool = False
+    ahead: bool = False
     needs: tuple[str, str] | None = None
 
     def check(self, suffix: str) -> None:

@@ -22,7 +22,7 @@ def write_vtp(frames: Iterable[Frame], path: Path, about: About) -> None:
     data: `TimeValue` [s]. Lengths are in metres, in the precision of the run, and y is up.
     """
     for frame in frames:
-        _save(_particles(frame), path)
+        _save(particles(frame), path)
 
 
 def write_pvd(frames: Iterable[Frame], path: Path, about: About) -> None:
@@ -34,7 +34,7 @@ def write_pvd(frames: Iterable[Frame], path: Path, about: About) -> None:
     written: dict[tuple[str, int], str] = {}
     for frame in frames:
         name = f"{path.stem}_{frame.number:06d}.vtp"
-        _save(_particles(frame), path.with_name(name))
+        _save(particles(frame), path.with_name(name))
         entries.append((frame.time, 0, name))
         shapes = [d for d in frame.drawables if isinstance(d, Triangles) and d.vertices is not None]
         for part, shape in enumerate(shapes, 1):
@@ -48,7 +48,8 @@ def write_pvd(frames: Iterable[Frame], path: Path, about: About) -> None:
     path.write_text("\n".join([head, *lines, "</Collection>\n</VTKFile>\n"]), encoding="utf-8")
 
 
-def _particles(frame: Frame) -> Any:
+def particles(frame: Frame) -> Any:
+    """The particles of a frame as PolyData, with the lines and triangles between them, as `write_vtp` says."""
     n = len(frame.ids)
     radii, colors = radii_and_colors(frame)
     mesh = _mesh(frame.positions)
