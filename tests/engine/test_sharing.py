@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -52,3 +54,22 @@ def test_what_depends_on_the_same_text_is_shared() -> None:
     assert one.scaled_by is not third.scaled_by
     assert one.again is not third.again
     assert len(one.scaled_by.overloads) == 1
+
+
+PROGRAM = """
+import sys
+import numpy as np
+import pointmass as pm
+
+for law in sys.argv[1:]:
+    particles = pm.Particles(np.random.default_rng(1).uniform(-1, 1, (1100, 3)))
+    forces = [pm.SoftSphere(), *([pm.Drag(0.1)] if law == "drag" else [])]
+    sim = pm.Simulation(pm.ParticleSystem(particles, forces), "leapfrog", 1e-3, compiled=True)
+    sim.step(2)
+"""
+
+
+def test_a_process_may_load_a_kernel_without_the_one_that_it_was_compiled_after() -> None:
+    for laws in (["none", "drag"], ["drag"]):
+        done = subprocess.run([sys.executable, "-c", PROGRAM, *laws], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr

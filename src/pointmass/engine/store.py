@@ -17,6 +17,8 @@ import warnings
 from collections.abc import Iterator
 from functools import cache
 from hashlib import sha256
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
@@ -50,6 +52,7 @@ OWNING_ENTRY = {{**ENTRY, "_nrt": True}}
 '''
 FAST = ', "fastmath": {"contract", "arcp"}'  # never those that assume that there is no NaN, or reorder sums
 LOGGER = logging.getLogger("pointmass")  # says at level INFO what is compiled
+PREFIX = "pointmass_kernel_"  # of the names of their modules
 LOADED: dict[str, ModuleType] = {}
 LOCK = threading.RLock()
 
@@ -87,7 +90,7 @@ def load(title: str, text: str, dtype: str) -> ModuleType:
     with LOCK:
         if key not in LOADED:
             path = _written(key, source)
-            LOADED[key] = _import(f"pointmass_kernel_{key}", path)
+            LOADED[key] = _import(f"{PREFIX}{key}", path)
             if not any((path.parent / "__pycache__").glob(f"{key}.*.nbc")):
                 LOGGER.info("compiling %s (once per machine)...", title)
                 share(LOADED[key], source)
@@ -192,6 +195,25 @@ def _publish(path: Path, source: str) -> None:
             return
     finally:
         Path(beside).unlink(missing_ok=True)
+
+
+class _Absent(MetaPathFinder, Loader):
+    """An empty module in place of a kernel that is not loaded.
+
+    The machine code of a kernel that shares functions with another names the other's module, and needs nothing of it.
+    """
+
+    def find_spec(self, name: str, path: Any = None, target: ModuleType | None = None) -> ModuleSpec | None:
+        return ModuleSpec(name, self) if name.startswith(PREFIX) else None
+
+    def create_module(self, spec: ModuleSpec) -> None:
+        pass
+
+    def exec_module(self, module: ModuleType) -> None:
+        pass
+
+
+sys.meta_path.append(_Absent())
 
 
 def _import(name: str, path: Path) -> ModuleType:
