@@ -40,6 +40,7 @@ PASSES = (  # what there is for closures, `with`, array expressions and prange i
 )
 OPERATORS = frozenset([min, max, bool, int, *(value for value in vars(operator).values() if callable(value))])
 PLAIN = types.Number, types.Boolean, types.Array
+ELEMENTS: dict[Any, Any] = {}  # signatures of taking an element
 SIGNATURES: dict[Any, Any] = {}  # of operators and the numbers that they take
 
 
@@ -47,7 +48,9 @@ class Inner(CompilerBase):
     """Numba's compiler for functions that only other compiled functions call."""
 
     def __init__(self, typing: Context, target: Any, library: None, *more: Any) -> None:
-        super().__init__(_Remembering(typing), target, _Text(target.codegen(), "inner"), *more)
+        known = copy(target)
+        known.typing_context = _Remembering(typing)
+        super().__init__(known.typing_context, known, _Text(target.codegen(), "inner"), *more)
 
     def define_pipelines(self) -> list[PassManager]:
         manager = PassManager("inner")
@@ -118,3 +121,19 @@ class _Remembering(Context):
         if (func, args) not in SIGNATURES:
             SIGNATURES[func, args] = super().resolve_function_type(func, args, kws)
         return SIGNATURES[func, args]
+
+    def resolve_value_type(self, val: Any) -> Any:
+        found = super().resolve_value_type(val)
+        return _Element(found) if val is operator.getitem else found
+
+
+class _Element(types.Function):
+    """Taking an element of an array: lowering asks what that means for each one that is taken."""
+
+    def __init__(self, function: types.Function) -> None:
+        self.__dict__.update(function.__dict__)
+
+    def get_call_type(self, context: Context, args: Any, kws: Any) -> Any:
+        if args not in ELEMENTS:
+            ELEMENTS[args] = super().get_call_type(context, args, kws)
+        return ELEMENTS[args]
