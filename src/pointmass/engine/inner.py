@@ -40,17 +40,21 @@ PASSES = (  # what there is for closures, `with`, array expressions and prange i
 )
 OPERATORS = frozenset([min, max, bool, int, *(value for value in vars(operator).values() if callable(value))])
 PLAIN = types.Number, types.Boolean, types.Array
-ELEMENTS: dict[Any, Any] = {}  # signatures of taking an element
-SIGNATURES: dict[Any, Any] = {}  # of operators and the numbers that they take
+SIGNATURES: dict[Any, Any] = {}  # of operators and the numbers and arrays that they take
 
 
-class Inner(CompilerBase):
-    """Numba's compiler for functions that only other compiled functions call."""
+class _AsText(CompilerBase):
+    """A compiler of Numba's whose libraries are text."""
 
     def __init__(self, typing: Context, target: Any, library: None, *more: Any) -> None:
-        known = copy(target)
-        known.typing_context = _Remembering(typing)
-        super().__init__(known.typing_context, known, _Text(target.codegen(), "inner"), *more)
+        texts = copy(target)
+        texts._internal_codegen = _Texts(target.codegen())
+        texts.typing_context = _Remembering(typing)
+        super().__init__(texts.typing_context, texts, library, *more)
+
+
+class Inner(_AsText):
+    """Numba's compiler for functions that only other compiled functions call."""
 
     def define_pipelines(self) -> list[PassManager]:
         manager = PassManager("inner")
@@ -60,13 +64,8 @@ class Inner(CompilerBase):
         return [manager]
 
 
-class Loop(Compiler):
+class Loop(_AsText, Compiler):
     """Numba's compiler for loops of all threads, whose many small functions are text, too."""
-
-    def __init__(self, typing: Context, target: Any, library: None, *more: Any) -> None:
-        texts = copy(target)
-        texts._internal_codegen = _Texts(target.codegen())
-        super().__init__(_Remembering(typing), texts, None, *more)
 
 
 class _Texts:
@@ -134,6 +133,4 @@ class _Element(types.Function):
         self.__dict__.update(function.__dict__)
 
     def get_call_type(self, context: Context, args: Any, kws: Any) -> Any:
-        if args not in ELEMENTS:
-            ELEMENTS[args] = super().get_call_type(context, args, kws)
-        return ELEMENTS[args]
+        return context.resolve_function_type(operator.getitem, args, kws)

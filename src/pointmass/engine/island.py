@@ -289,8 +289,7 @@ class IslandKernel:
             *indented(beyond, 1),
             "return status",
         ]
-        loops = any("prange" in line for line in lines)
-        return function("advance", self.call, deriv.once if loops or not deriv.parallel else "**OWNING", lines)
+        return function("advance", self.call, deriv.once, lines)
 
     def _begin(self) -> list[str]:
         """At the beginning of a step: nobody has hit anything, and everybody is where the step began."""

@@ -83,17 +83,20 @@ class _Loop:
     def index(self) -> str:
         return ast.unparse(self.node.target)
 
+    @property
+    def ends(self) -> list[str]:
+        """Where it ends, or begins and ends."""
+        assert isinstance(self.node.iter, ast.Call)
+        return [ast.unparse(end) for end in self.node.iter.args]
+
     def call(self) -> list[str]:
         """What stands in its place."""
-        assert isinstance(self.node.iter, ast.Call)
-        ends = [ast.unparse(end) for end in self.node.iter.args]
-        call = f"{self.name}({', '.join([*ends, *self.given, *self.carried])})"
+        call = f"{self.name}({', '.join([*self.ends, *self.given, *self.carried])})"
         return [f"{' ' * self.node.col_offset}{f'{self._results} = ' if self.carried else ''}{call}"]
 
     def functions(self) -> list[str]:
         """What is done for one index, and the loop."""
-        assert isinstance(self.node.iter, ast.Call)
-        ends = "first_, last_" if len(self.node.iter.args) == 2 else "last_"
+        ends = ", ".join(["first_", "last_"][-len(self.ends) :])
         begin = [f"{name} = {'0' if add == '+' else f'{name}_'}" for name, add in self.carried.items()]
         began = [f"{name}_" for name in self.carried]
         back = [f"return {self._results}"] if self.carried else []

@@ -67,10 +67,13 @@ def folder() -> Path:
 
 def complete(title: str, text: str, dtype: str) -> str:
     """The text of functions as a whole module."""
+    return _head(title, dtype) + outlined(text)
+
+
+def _head(title: str, dtype: str) -> str:
     from pointmass import __version__
 
-    head = HEADER.format(title=title, version=__version__, dtype=dtype, fast=FAST if dtype == "float32" else "")
-    return head + outlined(text)
+    return HEADER.format(title=title, version=__version__, dtype=dtype, fast=FAST if dtype == "float32" else "")
 
 
 def load(title: str, text: str, dtype: str) -> ModuleType:
@@ -85,15 +88,14 @@ def load(title: str, text: str, dtype: str) -> ModuleType:
     """
     heed_environment()
     _spare_the_collector()
-    source = complete(title, text, dtype)
-    key = sha256((source + _surroundings()).encode()).hexdigest()[:20]
+    key = sha256((_head(title, dtype) + text + _surroundings()).encode()).hexdigest()[:20]
     with LOCK:
         if key not in LOADED:
-            path = _written(key, source)
+            path = _written(key, title, text, dtype)
             LOADED[key] = _import(f"{PREFIX}{key}", path)
             if not any((path.parent / "__pycache__").glob(f"{key}.*.nbc")):
                 LOGGER.info("compiling %s (once per machine)...", title)
-                share(LOADED[key], source)
+                share(LOADED[key], path.read_text(encoding="utf-8"))
         return LOADED[key]
 
 
@@ -154,20 +156,24 @@ def _surroundings() -> str:
     import numba
     import numpy as np
 
-    from pointmass.engine import support
+    from pointmass.engine import outlining, support
     from pointmass.tracing import noise
 
-    helpers = [Path(file).read_text(encoding="utf-8") for file in (support.__file__, noise.__file__)]
+    files = (support.__file__, noise.__file__, outlining.__file__)
+    helpers = [Path(file).read_text(encoding="utf-8") for file in files]
     return repr((numba.__version__, llvmlite.__version__, np.__version__, sys.version, sys.platform, helpers))
 
 
-def _written(key: str, source: str) -> Path:
-    """The file of a kernel. The first process that writes it wins: its time stamp is part of Numba's key."""
+def _written(key: str, title: str, text: str, dtype: str) -> Path:
+    """The file of a kernel, which is completed if it is not there.
+
+    The first process that writes it wins: its time stamp is part of Numba's key.
+    """
     path = folder() / f"{key}.py"
     try:
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
-            _publish(path, source)
+            _publish(path, complete(title, text, dtype))
     except OSError as error:
         warnings.warn(
             f"kernels cannot be kept in {str(folder())!r} ({error.strerror}), so they are compiled in every process: "
@@ -176,7 +182,7 @@ def _written(key: str, source: str) -> Path:
             stacklevel=2,
         )
         path = Path(tempfile.mkdtemp(prefix="pointmass-")) / f"{key}.py"
-        path.write_text(source, encoding="utf-8")
+        path.write_text(complete(title, text, dtype), encoding="utf-8")
     return path
 
 
