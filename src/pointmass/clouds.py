@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.errors import InvalidInput, finite_array, reading, whole_number
+from pointmass.libraries import check_library
 
 Columns = dict[str, Any]
 
@@ -52,8 +52,7 @@ def read_cloud(path: str | Path, frame: int | None = None) -> Cloud:
     """
     with reading("particle", path, tuple(READERS)) as file:
         suffix = file.suffix.lower()
-        if suffix in NEEDS and find_spec(NEEDS[suffix][0]) is None:
-            raise InvalidInput(f"reading {suffix} needs {NEEDS[suffix][1]}: pip install 'pointmass[export]'")
+        check_library("reading", suffix)
         found = READERS[suffix](file, None if frame is None else whole_number("frame", frame, at_least=0))
         x = finite_array("positions", np.reshape(found["x"], (-1, 3)), (None, 3))
         v, radius, ids = (found.get(name) for name in ("v", "radius", "ids"))
@@ -223,9 +222,4 @@ READERS: dict[str, Callable[[Path, int | None], Columns]] = {
     ".usd": _usd,
     ".usda": _usd,
     ".usdc": _usd,
-}
-NEEDS = {
-    ".vtp": ("vtkmodules", "vtk"),
-    ".gsd": ("gsd", "gsd"),
-    **dict.fromkeys((".usd", ".usda", ".usdc"), ("pxr", "usd-core")),
 }

@@ -8,6 +8,8 @@ the particles. Colours are linear-light RGBA; RGB may exceed 1 (light that glows
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from math import dist
 from typing import Any, ClassVar, Literal
@@ -176,6 +178,13 @@ class Frame:
     velocities: Floats
     drawables: tuple[Drawable, ...] = ()
     quantities: dict[str, float] = field(default_factory=dict)
+
+
+def last_of(frames: Iterable[Frame]) -> Frame | None:
+    """The last one, None if there are none: of a sequence no other is asked for, and of a stream no other is kept."""
+    if isinstance(frames, Sequence):
+        return frames[len(frames) - 1] if len(frames) else None
+    return next(iter(deque(frames, maxlen=1)), None)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -44,7 +44,8 @@ from pointmass.toml import dumps
 from pointmass.zones import WHEN_FULL, WhenFull, Zone
 
 VERSION = 1
-PATHS = (".grid", ".mesh", ".heights", ".distances", ".file")  # parameters that may be paths
+FILES = ("mesh", "heights", "distances", "file")  # parameters that may be paths, beside `grid`
+PATHS = tuple(f".{name}" for name in ("grid", *FILES))
 HOLDS: dict[str, type] = {
     **{"bodies": Body, "forces": Force, "colliders": Collider, "emitters": Emitter, "zones": Zone},
     "motions": RigidMotion,
@@ -427,7 +428,7 @@ def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, fol
             values["around"] = [_made(COLLIDERS, solid, f"{where}.around.{k}", folder) for k, solid in solids]
         if "grid" in values:
             values["grid"] = _grid(values["grid"], folder)
-        for name in ("mesh", "heights", "distances", "file"):
+        for name in FILES:
             if isinstance(values.get(name), str):
                 values[name] = _found(name, values[name], folder)
         return registry[kind](**values)

@@ -94,6 +94,6 @@ def test_every_exporter_says_what_it_does() -> None:
 
 
 def test_what_is_not_installed_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pointmass.export.exporter.find_spec", lambda name: None)
+    monkeypatch.setattr("pointmass.libraries.find_spec", lambda name: None)
     with pytest.raises(InvalidInput, match=r"writing \.usd needs usd-core: pip install 'pointmass\[export\]'"):
         export(frames_of([2]), tmp_path / "a.usd")

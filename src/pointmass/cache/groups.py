@@ -160,7 +160,7 @@ def _write_array(folder: Path, array: Array) -> list[Any]:
     if array.size:  # an array without entries has no chunk
         data = compress(array, LEVEL, True)
         (folder / _chunk(array.ndim)).write_bytes(data)
-    return _kind(array, data)
+    return _kind(array.dtype, array.shape, data)
 
 
 def _read_array(folder: Path, kind: list[Any]) -> Array:
@@ -174,7 +174,7 @@ def _read_array(folder: Path, kind: list[Any]) -> Array:
         if codecs != CODECS or chunk != tuple(max(1, side) for side in shape):
             raise Damaged(f"{folder.name} was stored by another program")
         data = b"" if 0 in shape else (folder / _chunk(len(shape))).read_bytes()
-        if [dtype.name, *shape, _sum(data)] != kind:
+        if _kind(dtype, shape, data) != kind:
             raise Damaged(f"{folder.name} is another array than that which was written")
         if 0 in shape:
             return np.zeros(shape, dtype)
@@ -203,13 +203,9 @@ def _chunk(ndim: int) -> str:
     return ".".join(["c", *["0"] * ndim])
 
 
-def _kind(array: Array, data: bytes) -> list[Any]:
+def _kind(dtype: np.dtype[Any], shape: tuple[int, ...], data: bytes) -> list[Any]:
     """Type, shape and checksum of an array as they can stand in JSON."""
-    return [array.dtype.newbyteorder("=").name, *array.shape, _sum(data)]
-
-
-def _sum(data: bytes) -> int:
-    return int.from_bytes(data[-SUM:], "little")
+    return [dtype.name, *shape, int.from_bytes(data[-SUM:], "little")]
 
 
 def _write_attributes(path: Path, attributes: Attributes, kinds: Mapping[str, list[Any]]) -> None:

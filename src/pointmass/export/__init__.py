@@ -17,21 +17,20 @@ from pointmass.export.table import write_csv
 from pointmass.export.usd import write_usd
 from pointmass.export.vtkhdf import write_vtkhdf
 from pointmass.export.vtp import write_pvd, write_vtp
-from pointmass.frame import Frame
+from pointmass.frame import Frame, last_of
+from pointmass.libraries import check_library
 from pointmass.sequences import is_sequence
-
-USD, VTK, GSD = ("pxr", "usd-core"), ("vtkmodules", "vtk"), ("gsd", "gsd")
 
 EXPORTERS: dict[str, Exporter] = {
     ".npz": Exporter(write=write_npz),
     ".csv": Exporter(write=write_csv),
-    ".usd": Exporter(write=write_usd, needs=USD),
-    ".usdc": Exporter(write=write_usd, needs=USD),
-    ".usda": Exporter(write=write_usd, needs=USD),
-    ".pvd": Exporter(write=write_pvd, needs=VTK),
-    ".vtkhdf": Exporter(write=write_vtkhdf, ahead=True, needs=VTK),
-    ".vtp": Exporter(write=write_vtp, needs=VTK, still=True),
-    ".gsd": Exporter(write=write_gsd, needs=GSD),
+    ".usd": Exporter(write=write_usd),
+    ".usdc": Exporter(write=write_usd),
+    ".usda": Exporter(write=write_usd),
+    ".pvd": Exporter(write=write_pvd),
+    ".vtkhdf": Exporter(write=write_vtkhdf, ahead=True),
+    ".vtp": Exporter(write=write_vtp, still=True),
+    ".gsd": Exporter(write=write_gsd),
     ".ply": Exporter(write=write_ply, still=True),
     ".obj": Exporter(write=write_obj, still=True),
     ".glb": Exporter(write=write_glb, still=True),
@@ -53,7 +52,7 @@ def check_export(path: str | Path) -> Exporter:
     suffix = path.suffix.lower()
     if suffix not in EXPORTERS:
         raise unknown("kind of export", path.suffix, EXPORTERS)
-    EXPORTERS[suffix].check(suffix)
+    check_library("writing", suffix)
     is_sequence(path)
     check_place(path)
     return EXPORTERS[suffix]
@@ -89,7 +88,8 @@ def export(
     exporter = check_export(path)
     about = about or About(name=path.stem)
     if exporter.still and not is_sequence(path):
-        frames = _last(frames)
+        last = last_of(frames)
+        frames = [] if last is None else [last]
     if exporter.ahead and not is_sequence(path):
         about = replace(about, times=_times(frames, path.suffix))
     with beside(path) as part:
@@ -99,15 +99,6 @@ def export(
                 exporter.write([frame], part.with_name(part.name % frame.number), replace(about, times=(frame.time,)))
         else:
             exporter.write(counted, part, about)
-
-
-def _last(frames: Iterable[Frame]) -> list[Frame]:
-    if isinstance(frames, Sequence):
-        return [frames[len(frames) - 1]] if len(frames) else []
-    last: list[Frame] = []
-    for frame in frames:
-        last = [frame]
-    return last
 
 
 def _times(frames: Iterable[Frame], suffix: str) -> tuple[float, ...]:

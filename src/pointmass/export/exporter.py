@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 
-from pointmass.errors import InvalidInput
 from pointmass.frame import Camera, Frame
 
 
@@ -44,21 +42,8 @@ class Exporter:
         file, in a folder of its own that may hold others beside it in the end; and what there is to know of the run.
     still : whether a file holds one frame.
     ahead : whether it must know the times of all frames before it takes the first.
-    needs : the module without which it cannot, and what to install for it.
     """
 
     write: Write
     still: bool = False
     ahead: bool = False
-    needs: tuple[str, str] | None = None
-
-    def check(self, suffix: str) -> None:
-        """Refuse what lacks its library.
-
-        Raises
-        ------
-        InvalidInput
-            It is not installed.
-        """
-        if self.needs is not None and find_spec(self.needs[0]) is None:
-            raise InvalidInput(f"writing {suffix} needs {self.needs[1]}: pip install 'pointmass[export]'")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import shutil
 import tempfile
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
@@ -13,7 +12,7 @@ from itertools import chain
 from pathlib import Path
 
 from pointmass.errors import InvalidInput, unknown, whole_number
-from pointmass.frame import Camera, Frame
+from pointmass.frame import Camera, Frame, last_of
 from pointmass.lock import hidden, locked
 from pointmass.render.camera import fit_camera
 from pointmass.render.image import checked_size
@@ -144,7 +143,8 @@ def write(
     try:
         with _room(target, keep=whole) as room:
             if is_single(target):
-                last = _last(frames)
+                last = last_of(frames)
+                assert last is not None
                 save_png(shot.picture(last), room / target.name, shot.fingerprints().of(last))
                 tick(1)
             elif target.suffix.lower() == STILL:
@@ -176,15 +176,6 @@ def _room(target: Path, keep: bool) -> Iterator[Path]:
                 shutil.rmtree(room, ignore_errors=True)
             raise
         shutil.rmtree(room, ignore_errors=True)
-
-
-def _last(frames: Iterable[Frame]) -> Frame:
-    last: Frame
-    if isinstance(frames, Sequence):
-        last = frames[len(frames) - 1]
-    else:
-        (last,) = deque(frames, maxlen=1)
-    return last
 
 
 def _rate(fps: float | Fraction) -> Fraction:

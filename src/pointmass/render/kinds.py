@@ -81,19 +81,23 @@ class Encoder:
 
 def _opened(path: Path, codec: str, rate: Fraction, options: dict[str, str]) -> tuple[Any, Any]:
     """A new file and its only stream."""
+    container = _new(path)
+    return container, container.add_stream(codec, rate=rate, options=options)
+
+
+def _new(path: Path) -> Any:
+    """A new file, without streams."""
     import av
 
     begun = {"movflags": "+faststart"} if path.suffix.lower() in (".mp4", ".mov") else {}
-    container: Any = av.open(str(path), "w", options=EXACT | begun)
-    return container, container.add_stream(codec, rate=rate, options=options)
+    return av.open(str(path), "w", options=EXACT | begun)
 
 
 def _join_videos(parts: Sequence[Path], path: Path, kind: Kind, rate: Fraction, transparent: bool) -> None:
     """One video of several, as they are encoded."""
     import av
 
-    begun = {"movflags": "+faststart"} if path.suffix.lower() in (".mp4", ".mov") else {}
-    with av.open(str(path), "w", options=EXACT | begun) as film:
+    with _new(path) as film:
         stream: Any = None
         first = 0
         for part in parts:
