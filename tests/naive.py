@@ -462,7 +462,8 @@ def soft_sphere(xi, vi, mi, pi, xj, vj, mj, pj):
     overlap = pi["radius"] + pj["radius"] - r
     if overlap <= 0:
         return [0.0, 0.0, 0.0]
-    return scale((pi["k_s"] * overlap - pi["k_d"] * dot(sub(vi, vj), d) / r) / r, d)
+    damping = pi["k_d"] * (min(1.0, overlap / pi["onset"]) if pi["onset"] > 0 else 1.0)
+    return scale((pi["k_s"] * overlap - damping * dot(sub(vi, vj), d) / r) / r, d)
 
 
 def soft_sphere_energy(xi, mi, pi, xj, mj, pj):

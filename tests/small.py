@@ -16,7 +16,7 @@ SMALL: dict[str, dict[str, object]] = {  # fewer particles where the default tak
     "drape": {"particles": 12},
     "tear": {"particles": 16},
     "curtain": {"particles": 13, "rings": 5, "stretch": 180.0},
-    "net": {"balls": 3, "size": 1.2, "mesh": 0.6},
+    "net": {"balls": 3, "size": 1.2, "mesh": 0.5},
     "jelly": {"particles": 4},
     "heap": {"cloths": 2, "particles": 10},
     "hair": {"strands": 16, "children": 2},

@@ -21,8 +21,8 @@ def chosen(system: ParticleSystem, dt: float) -> tuple[Solver, str]:
     """A solver for a system as it is now, with steps of dt [s], and one sentence that says why.
 
     A flow gets RK4. Else it is symplectic_euler, which costs least, where the system's fastest motion lets it make such
-    steps; and where it does not, implicit_euler, which has no limit. Forces between pairs have no kernel there: if it
-    is springs and the like that are too stiff, and they are not, it is xpbd instead.
+    steps; and where it does not, implicit_euler, which has no limit. Forces between pairs cost much there: if it is
+    springs and the like that are too stiff, and they are not, it is xpbd instead.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def chosen(system: ParticleSystem, dt: float) -> tuple[Solver, str]:
         with system.slack():
             rest = _limit(system)
         if dt <= rest:
-            return XPBD(), f"xpbd, because {why}; there are forces between pairs, which suit no implicit solver"
+            return XPBD(), f"xpbd, because {why}; there are forces between pairs, which cost an implicit solver much"
     return ImplicitEuler(tolerance=TOLERANCE), f"implicit_euler, because {why}"
 
 

@@ -438,14 +438,21 @@ EXAMPLES: dict[str, list[Example]] = {
     "soft_sphere": [
         Example(
             {"k_s": "10*t", "k_d": 0.4, "radius": "0.8 + 0.2*charge"},
-            lambda i: {"k_s": 10 * TIME, "k_d": 0.4, "radius": 0.8 + 0.2 * CHARGE[i], "box": None},
+            lambda i: {"k_s": 10 * TIME, "k_d": 0.4, "radius": 0.8 + 0.2 * CHARGE[i], "onset": 0.0, "box": None},
+            naive.soft_sphere,
+            naive.soft_sphere_energy,
+            pairs=True,
+        ),
+        Example(
+            {"k_d": 0.4, "radius": 0.9, "onset": 0.5},
+            lambda i: {"k_s": 1000.0, "k_d": 0.4, "radius": 0.9, "onset": 0.5, "box": None},
             naive.soft_sphere,
             naive.soft_sphere_energy,
             pairs=True,
         ),
         Example(
             {"radius": 0.7, "box": (2.9, 2.8, 3.0)},
-            lambda i: {"k_s": 1000.0, "k_d": 0.0, "radius": 0.7, "box": (2.9, 2.8, 3.0)},
+            lambda i: {"k_s": 1000.0, "k_d": 0.0, "radius": 0.7, "onset": 0.0, "box": (2.9, 2.8, 3.0)},
             naive.soft_sphere,
             naive.soft_sphere_energy,
             pairs=True,

@@ -83,7 +83,7 @@ def test_a_soft_body_takes_implicit_steps_of_a_sixtieth(name: str, preset: str |
 
 @pytest.mark.full
 @pytest.mark.parametrize("small", [True, False], ids=["small", "normal"])
-@pytest.mark.parametrize(("name", "preset"), [s for s in SOFT if s[0] != "net"])  # its balls have no implicit kernel
+@pytest.mark.parametrize(("name", "preset"), SOFT)
 def test_a_soft_body_takes_implicit_steps_of_a_sixtieth_at_full_length(
     name: str, preset: str | None, small: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from types import SimpleNamespace
 from typing import Any
 
@@ -382,3 +383,66 @@ def test_a_dozen_families_on_a_floor(count: int, monkeypatch: pytest.MonkeyPatch
     slow, fast = run(False), run(True)
     np.testing.assert_allclose(fast.x, slow.x, atol=1e-9)
     np.testing.assert_allclose(fast.v, slow.v, atol=1e-8)
+
+
+def balls(box: tuple[float, float, float] | None = None) -> pm.ParticleSystem:
+    """A heap of balls that overlap, some of them ends of springs, one pinned."""
+    rng = np.random.default_rng(12)
+    x = np.stack(np.meshgrid(*3 * [np.arange(4)], indexing="ij"), axis=-1).reshape(-1, 3) * 0.25
+    x = x + rng.uniform(-0.05, 0.05, x.shape)
+    particles = pm.Particles(x, rng.uniform(-1, 1, x.shape), rng.uniform(0.5, 2, 64), radius=rng.uniform(0.1, 0.18, 64))
+    particles.pin([3])
+    springs = pm.Springs(np.array([[0, 5], [9, 40], [60, 63]]), 30.0, 0.4, 0.2)
+    return pm.ParticleSystem(particles, [pm.Gravity(), springs, pm.SoftSphere(400.0, 3.0, box=box)])
+
+
+def magnets() -> pm.ParticleSystem:
+    """A law that is not the same for both of a pair, and depends on their own places."""
+
+    @pm.pair_force(cutoff=0.7, per_particle=["charge"])
+    def lopsided(x1, v1, m1, x2, v2, m2, t, k=2.0, charge="charge"):
+        d = pm.sub(x2, x1)
+        pull = k * charge[1] * pm.inverse(0.1 + pm.dot(d, d)) - 0.3 * pm.dot(v1, d)
+        return pm.add(pm.scale(pull, d), pm.scale(0.1, x1))
+
+    rng = np.random.default_rng(13)
+    particles = pm.Particles(rng.uniform(0, 1, (30, 3)), rng.uniform(-1, 1, (30, 3)), charge=rng.uniform(0.1, 1, 30))
+    return pm.ParticleSystem(particles, [pm.Gravity(), pm.Drag(0.4), lopsided()])
+
+
+def on_the_floor() -> pm.ParticleSystem:
+    """Some of the balls stand on the ground."""
+    system = balls()
+    system.particles.x[:, 1] -= 0.1
+    plane = pm.Plane(friction=0.3, restitution=0.0)
+    return pm.ParticleSystem(system.particles, system.forces, [plane])
+
+
+@pytest.mark.parametrize(
+    ("make", "solver"),
+    [
+        (lambda: balls((1.2, 1.1, 1.0)), pm.BDF2),
+        (magnets, pm.ImplicitEuler),
+        (on_the_floor, pm.ImplicitEuler),
+    ],
+    ids=["box", "magnets", "floor"],
+)
+def test_pairs_agree_with_the_reference(make: Any, solver: Any) -> None:
+    """The neighbours are found by the kernel, and change from step to step; balls leave and meet each other."""
+    ours, theirs = make(), make()
+    outcome, _ = advanced(ours, solver("cg", **SHARP), 6, jit=True)
+    reference(theirs, solver("cg", **SHARP), 6)
+    assert outcome.good
+    np.testing.assert_allclose(ours.particles.x, theirs.particles.x, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(ours.particles.v, theirs.particles.v, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("force", "has"), [(pm.SoftSphere(), True), (pm.LennardJones(cutoff=0.5), True), (pm.Gravitation(), False)]
+)
+def test_pairs_within_a_cut_off_have_implicit_kernels(force: pm.Force, has: bool) -> None:
+    particles = pm.Particles([[0, 0, 0], [0.3, 0, 0]], radius=0.2)
+    system, solver = pm.ParticleSystem(particles, [force]), pm.ImplicitEuler()
+    told = nullcontext() if has else pytest.warns(UserWarning, match="no kernel under implicit_euler: use leapfrog")
+    with told:
+        assert pm.Simulation(system, solver, DT, compiled=True).engine.compiled == has

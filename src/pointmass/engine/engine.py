@@ -23,6 +23,7 @@ from pointmass.engine.energy import PairEnergy
 from pointmass.engine.island import IslandKernel, Outcome, Span, everybody
 from pointmass.engine.lanes import LanesKernel, topologies
 from pointmass.engine.lattice import LatticeKernel, grid
+from pointmass.engine.pairs import has_slopes
 from pointmass.engine.phases import simple
 from pointmass.engine.reference import ReferenceEngine
 from pointmass.engine.singles import SingleMembers, SinglesKernel
@@ -136,7 +137,8 @@ class Engine:
         found = []
         for force in self.system.forces:
             if isinstance(force, PairForce) and isinstance(self.solver, Implicit):
-                found.append(f"pairs such as {force.called} have no kernel under {self.solver.name}: use leapfrog")
+                if not (self.system.order == 2 and has_slopes(force, self.system.particles)):
+                    found.append(f"pairs such as {force.called} have no kernel under {self.solver.name}: use leapfrog")
             elif not isinstance(force, (UnaryForce, ElementForce, PairForce)):
                 found.append(
                     f"{force.called} is a NumPy function: use a law, such as pm.unary_force or pm.spring_force"

@@ -105,7 +105,8 @@ class Deriv:
         self.pairs: list[Pairs] = []
         self._searches: dict[str, str] = {}  # for neighbours, by their text
         self.loop = "prange" if parallel else "range"
-        self.flags = "parallel=True, **OWNING" if parallel else "**FLAGS"
+        several = implicit and not relaxed  # functions are called in several places, and would be as many copies
+        self.flags = "parallel=True, **OWNING" if parallel else "**APART" if several else "**FLAGS"
         self.once = self.flags if parallel else "forceinline=True, **FLAGS"  # each array is seven arguments of a call
         self._at_time: list[str] = []
         self.text = self._printed()
@@ -216,12 +217,21 @@ class Deriv:
 
     def _pairs(self, force: PairForce) -> tuple[list[str], list[str]]:
         """Statements that evaluate all pairs, and those that add what they do to a particle."""
-        pairs = Pairs(force, len(self.families) + len(self.pairs), self.binder, self.parallel, self._searches)
+        number = len(self.families) + len(self.pairs)
+        pairs = Pairs(force, number, self.binder, self.parallel, self._searches, self.implicit and not self.relaxed)
         self.pairs.append(pairs)
-        j, switch = pairs.number, self.binder.switch(force)
-        evaluate = [f"# {force.name}", f"if {switch} != 0 and e{j} > s{j}:", f"    status |= {pairs.call()}"]
-        gather = [f"if {switch} != 0:", *(f"    f_{a} = f_{a} + F{j}[3 * g + {k}]" for k, a in enumerate("xyz"))]
+        j = pairs.number
+        evaluate = [f"# {force.name}", f"if {self.acting(pairs)}:", f"    status |= {pairs.call()}"]
+        gather = [
+            f"if {self.binder.switch(force)} != 0:",
+            *(f"    f_{a} = f_{a} + F{j}[3 * g + {k}]" for k, a in enumerate("xyz")),
+        ]
         return evaluate, gather
+
+    def acting(self, pairs: Pairs) -> str:
+        """Whether pairs act in an island, as an expression."""
+        j = pairs.number
+        return f"{self.binder.switch(pairs.force)} != 0 and e{j} > s{j}"
 
     @property
     def projections(self) -> list[str]:

@@ -22,6 +22,7 @@ UPPER = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]  # entries that are kep
 AXES = range(3)
 SQUARE = [(i, j) for i in AXES for j in AXES]
 PLACE = dict(zip("xyz", ("o", "o + apart", "o + twice"), strict=True))  # of a vector like p
+NEAR = Kind("near", False, ())  # blocks of pairs, which are found anew each time
 FOLD = """while count > 1:
     half = (count + 1) // 2
     for k in range(count - half):
@@ -55,7 +56,8 @@ class Gradients:
         vector = f"np.empty(3 * (M[0] + {2 * LANES}), R)"
         tiles = f"np.empty({len(self.rows) * APART} * (M[0] // {BLOCK} + 1), R)"
         blocks = [name for kind in kinds for name in (*kind.arrays, f"{kind.name}_K", f"{kind.name}_R")]
-        self.matrix = ", ".join(["base", "n", "slices", *blocks, *["Q"] * projected])
+        blocks += [name for pairs in deriv.pairs for name in pairs.blocks]
+        self.matrix = ", ".join(["base", "n", *["slices"] * bool(kinds), *blocks, *["Q"] * projected])
         given = ", ".join([*deriv.binder.arrays, self.matrix])
         self.calls = [
             f"condense({given}, g, U, V)",
@@ -206,10 +208,18 @@ class Gradients:
         for kind in self.kinds:
             one = [f"o = np.uintp({LANES} + other)", *self._times(kind, f"{kind.name}_K", 1, str)]
             rest += self._rest(kind, one)
+        for pairs in self.deriv.pairs:
+            first, other, block = pairs.blocks
+            near = [f"o = np.uintp({LANES} + {other}[np.uintp(entry)])", "e = np.uintp(9) * np.uintp(entry)"]
+            near += self._times(NEAR, block, 1, str)
+            rest += [
+                f"for entry in range({first}[2 * g_], {first}[2 * g_] + {first}[2 * g_ + 1]):",
+                *indented(near, 1),
+            ]
         if self.projected:
             rest += [*read("Q", "(begin + l)", "s_"), *times("s_", ("q_x", "q_y", "q_z"), ("q_x", "q_y", "q_z"))]
         rest = self._slice([*rest, *(f"{self._at(f'q_{a}')} = q_{a}" for a in "xyz")])
-        if not self.projected:
+        if not self.projected and not self.deriv.pairs:
             left = (f"{k.name}_ends[base + begin] < {k.name}_ends[base + begin + width]" for k in self.kinds)
             rest = [f"if {' or '.join(left)}:", *indented(rest, 1)]
         own = [here, *(f"p_{a} = p[{o}]" for a, o in PLACE.items())]

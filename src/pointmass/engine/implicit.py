@@ -74,16 +74,16 @@ class _Printer:
         share = "share" if solver.newton == "full" else literal(0.0, self.dtype)
         self.families = [_Family(deriv, f, share) for f in deriv.families]
         self.kinds = _kinds(self.families)
-        self.linked = bool(self.families)
+        self.linked = bool(self.families or deriv.pairs)
         self.searches = self.second and solver.newton == "full"  # for the place where the potential is least
         # Conjugate gradients see the symmetric part of the matrix alone, and one step of Newton's method shows that.
         self.direct = solver.linear_solver == "direct"
         auto = solver.linear_solver == "auto" and solver.newton == "full"
-        self.eliminates = self.linked and (self.direct or auto)
+        self.eliminates = bool(self.families) and not deriv.pairs and (self.direct or auto)
         self.arrays = [array for kind in self.kinds for array in kind.arrays]
         buffers = [f"{kind.name}_{b}" for kind in self.kinds for b in "KR"]
         self.shared = ", ".join(
-            [deriv.call, *self.arrays, *["slices"] * self.linked, *buffers, *["Q", "Qw"] * self.projected]
+            [deriv.call, *self.arrays, *["slices"] * bool(self.kinds), *buffers, *["Q", "Qw"] * self.projected]
         )
 
     def text(self) -> StepText:
@@ -190,6 +190,10 @@ class _Printer:
         first = self.deriv.projections if self.projected else []
         if self.projected and self.linked:
             first += [f"for i in {self.deriv.loop}(n):", *indented(_projected("Q", "gap", "u"), 1)]
+        for pairs in self.deriv.pairs:
+            elements += [f"# {pairs.force.name}", f"if {self.deriv.acting(pairs)}:"]
+            elements += [f"    status |= {pairs.slopes_call('u' if self.projected else 'gap')}", "else:"]
+            elements += indented(pairs.off(), 1)
         timed, particle, own = self._own_blocks()
         lines = [
             *self.deriv.binder.numbers.lines(),
@@ -228,6 +232,10 @@ class _Printer:
             for (i, q, j), out in zip(((i, q, j) for i in AXES for q in "ab" for j in AXES), text.outputs, strict=True):
                 if out != literal(0.0, self.dtype):
                     lines.append(f"{q}{i}{j} = {q}{i}{j} + {out if acts is None else f'({out} if {acts} else R(0))'}")
+        for pairs in self.deriv.pairs:
+            found = True
+            lines.append(f"if {self.deriv.binder.switch(pairs.force)} != 0:")
+            lines += [f"    {s} = {s} + {pairs.slope(k)}" for k, s in enumerate(sums)]
         if self.projected and self.second:
             lines += [*read("Q", "i", "s_"), *sandwich("a"), *sandwich("b")]
         lines += ["b = np.uintp(18 * i)"]
@@ -236,6 +244,9 @@ class _Printer:
             lines += [f"w = {binder.attribute('w', 'g_')}", *(f"f_{a} = R(0)" for a in "xyz")]
             for family in self.families:
                 lines += family.gather()
+            for pairs in self.deriv.pairs:
+                lines.append(f"if {self.deriv.binder.switch(pairs.force)} != 0:")
+                lines += [f"    f_{a} = f_{a} + {pairs.slope(18 + k)}" for k, a in enumerate("xyz")]
             if self.projected:
                 lines += times("s_", ("f_x", "f_y", "f_z"), ("f_x", "f_y", "f_z"))
             for i, a in enumerate("xyz"):

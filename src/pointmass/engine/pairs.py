@@ -30,9 +30,11 @@ HEAD = 8  # numbers about the list (known, room, most, how often found, records,
 NEAR_LANES = 8  # neighbours of a particle are a multiple of these: sums that grow side by side
 FINE = (3, 1, 1)  # cells to a cut-off and skin along each axis: a row of cells along x is one stretch of the list
 SMALLEST = 1e-9  # cut-off [m], for balls without a radius
+SLOPES = 21  # numbers of a row for implicit solvers: df/dx and df/dv by its own state, and a sum of products
 FULL = 16  # status: the list has too little room
 
 Rows = NDArray[np.intp]
+Slopes = dict[tuple[int, int, int], str]
 
 
 class Pairs:
@@ -40,29 +42,42 @@ class Pairs:
 
     Attributes
     ----------
-    text : its functions; the one to call is `pairs{number}`.
+    text : its functions; those to call are `pairs{number}` and, for implicit solvers, `slopes{number}`.
     arguments : arrays of the kernel that belong to it (`PairArrays.arrays`): H (rows), W (work), F (forces of all rows,
         shape (3 n,)); within a cut-off also K (head), L (cells), N (neighbours), X (positions when these were found);
         where not all act on all A: H begins with those that are acted on, A[1] of them, and ends with those that act,
-        from A[0] on.
+        from A[0] on; for implicit solvers those of its part of the matrix (`blocks`) and D, for each row df/dx, df/dv
+        by its own state and what `slopes` adds up.
+    blocks : of the matrix, beside its diagonal: I (for each row the first of its blocks, and how many), O (column of
+        each), Y (its 9 numbers).
     locals : what a call for one island takes besides, its range s, e in H.
 
     Parameters
     ----------
     searches : functions that search for neighbours and are printed already, text -> name; new ones are added.
+    implicit : whether its slopes are wanted; there are some where `has_slopes`.
     """
 
     def __init__(
-        self, force: PairForce, number: int, binder: Binder, parallel: bool, searches: dict[str, str] | None = None
+        self,
+        force: PairForce,
+        number: int,
+        binder: Binder,
+        parallel: bool,
+        searches: dict[str, str] | None = None,
+        implicit: bool = False,
     ) -> None:
         self.force, self.number, self.binder = force, number, binder
         self._searches: dict[str, str] = {} if searches is None else searches
         self.loop = "prange" if parallel else "range"
-        self.flags = "parallel=True, **OWNING" if parallel else "**OWNING"
+        self.flags = "parallel=True, **OWNING" if parallel else "forceinline=False, **OWNING"  # long, and called often
         self.tile = TILES[parallel]
         self.near = force.reach(binder.particles) is not None
         self.one_way = force.by is not None
+        self.implicit = implicit
+        self.blocks = [f"{a}{number}" for a in "IOY" * implicit]
         self.arguments = [f"{a}{number}" for a in "HWF" + "KLNX" * self.near + "A" * self.one_way]
+        self.arguments += [*self.blocks, *[f"D{number}"] * implicit]
         self.begin, self.acted = ("A[0]", "A[1]") if self.one_way else ("0", "m")
         self.locals = [f"s{number}", f"e{number}"]
         self._law = _Law(force, f"f{number}", binder, self.near)
@@ -71,16 +86,31 @@ class Pairs:
 
     def call(self, t: str = "t", x: str = "x", v: str = "v") -> str:
         """The call that fills F for an island, whose value is a status; it stands where base, P and C are known."""
-        arguments = ["base", *self.locals, "P", self.binder.particle.name, *self.arguments, t, x, v]
-        return f"pairs{self.number}({', '.join(arguments)})"
+        return self._called("pairs", t, x, v)
 
-    def _head(self) -> list[str]:
-        j, law = self.number, self._law
-        names = ["base", "s", "e", "P", self.binder.particle.name, *(a[0] for a in self.arguments), "t", "x", "v"]
+    def slopes_call(self, gap: str) -> str:
+        """The call that fills the blocks with gamma df/dv + gamma^2 df/dx, made symmetric, and D, whose sums are the
+        products of df/dx, without its diagonal, and a vector; it stands where g, x and v are known, too."""
+        return self._called("slopes", "g", gap, "t", "x", "v")
+
+    def slope(self, k: int) -> str:
+        """Number k of what `slopes` finds for particle g_, as an expression."""
+        return f"D{self.number}[np.uintp({SLOPES} * g_ + {k})]"
+
+    def off(self) -> list[str]:
+        """Statements that empty the blocks of an island."""
+        return [f"for i in {self.loop}(n):", f"    I{self.number}[2 * (base + i) + 1] = 0"]
+
+    def _called(self, function: str, *more: str) -> str:
+        arguments = ["base", *self.locals, "P", self.binder.particle.name, *self.arguments, *more]
+        return f"{function}{self.number}({', '.join(arguments)})"
+
+    def _head(self, function: str = "pairs", *more: str) -> list[str]:
+        names = ["base", "s", "e", "P", self.binder.particle.name, *(a[0] for a in self.arguments), *more]
         return [
             f"@njit({self.flags})",
-            f"def pairs{j}({', '.join(names)}):",
-            *indented([*self.binder.numbers.lines(), "status = 0", *law.at_time, "m = e - s"], 1),
+            f"def {function}{self.number}({', '.join([*names, 't', 'x', 'v'])}):",
+            *indented([*self.binder.numbers.lines(), "status = 0", *self._law.at_time, "m = e - s"], 1),
         ]
 
     def _all(self) -> str:
@@ -232,14 +262,7 @@ class Pairs:
         ]
 
     def _near(self) -> str:
-        j, law, loop = self.number, self._law, self.loop
-        force, particles = self.force, self.binder.particles
-        reach = self.binder.numbers.number(f"reach {id(force)}", lambda: _reach(force, particles))
-        sides = (
-            [self.binder.numbers.number(f"side {id(force)} {a}", _side(force, a)) for a in range(3)]
-            if force.box is not None
-            else []
-        )
+        law = self._law
         inputs = {q: f"y[4 * q + {a}]" for a, q in enumerate(law.packed)}
         more = [q for q in law.second if q not in law.packed]
         inputs |= {q: f"y[{(4 + k) * PIECE} + q]" for k, q in enumerate(more)}
@@ -274,6 +297,81 @@ class Pairs:
             *(f"    sum{k} = sum{k} + z[{a + PIECE}]" for k, a in enumerate(sums)),
             *law.result("H[s + L[k]]", "k"),
         ]
+        scratch = [f"y = np.empty({(4 + len(more)) * PIECE}, R)", f"z = np.empty({law.sums * step}, R)"]
+        build, listed = self._build(), self._listed()
+        parts = [*build, *self._head(), *indented([*listed, *self._each(scratch, particle), "return status"], 1)]
+        if self.implicit:
+            parts += ["", "", *self._head("slopes", "gamma", "gap")]
+            parts += indented([*listed, "gg = gamma * gamma", *self._each([], self._slopes()), "return status"], 1)
+        return "\n".join([*parts, ""])
+
+    def _each(self, scratch: list[str], particle: list[str]) -> list[str]:
+        """A loop over the particles that are acted on, the sorted ones r."""
+        return [
+            f"for chunk in {self.loop}(({self.acted} + {CHUNK - 1}) // {CHUNK}):",
+            *indented(scratch, 1),
+            f"    for r in range(np.int64(chunk) * {CHUNK}, min({self.acted}, (np.int64(chunk) + 1) * {CHUNK})):",
+            *indented(particle, 2),
+        ]
+
+    def _slopes(self) -> list[str]:
+        """Statements that find the blocks of the row of a particle."""
+        law = self._law
+        own, other = ({q: law.entry(q, place) for q in law.quantities} for place in ("k", "b"))
+        lines, first, second, turned = law.slopes(own, other, "j_")
+        axes = range(3)
+        places = [(i, c) for i in axes for c in axes]
+        sums = [f"{q}{i}{c}" for q in "ab" for i, c in places]
+        block = []
+        for i, c in places:
+            slope, back = (f"R(0.5) * ({second[i, q, c]} + {turned[c, q, i]})" for q in (0, 1))
+            block.append(f"Y[np.uintp(9) * o + np.uintp({3 * i + c})] = gamma * ({back}) + gg * ({slope})")
+        pulls = [" + ".join(f"{second[i, 0, c]} * gap[g2 + np.uintp({c})]" for c in axes) for i in axes]
+        near = [
+            *lines,
+            "there = np.int64(H[s + L[b]]) - base",
+            "g2 = np.uintp(3 * there)",
+            "o = np.uintp(found)",
+            "O[o] = there",
+            *block,
+            *(f"{q}{i}{c} = {q}{i}{c} + {first[i, k, c]}" for k, q in enumerate("ab") for i, c in places),
+            *(f"l{i} = l{i} + ({pull})" for i, pull in enumerate(pulls)),
+            "found += 1",
+        ]
+        return [
+            "k = np.int64(L[2 * top + r])",
+            *(f"{name} = R(0)" for name in (*sums, "l0", "l1", "l2")),
+            "found = r * room",
+            "for q in range(r * room, r * room + np.int64(L[top + r])):",
+            "    b = np.int64(N[np.uintp(q)])",
+            *(f"    d{a} = {own[q]} - {other[q]}" for a, q in enumerate(vector_names("x"))),
+            f"    if d0 * d0 + d1 * d1 + d2 * d2 < {'cut2' if len(law.packed) == 4 else 'W[4 * b + 3]'}:",
+            *indented(near, 2),
+            "g1 = np.int64(H[s + L[k]])",
+            "I[2 * g1] = r * room",
+            "I[2 * g1 + 1] = found - r * room",
+            *(f"D[np.uintp({SLOPES} * g1 + {a})] = {name}" for a, name in enumerate((*sums, "l0", "l1", "l2"))),
+        ]
+
+    @property
+    def _reaches(self) -> tuple[str, list[str]]:
+        """The cut-off, and the sides of a periodic box."""
+        force, particles, numbers = self.force, self.binder.particles, self.binder.numbers
+        reach = numbers.number(f"reach {id(force)}", lambda: _reach(force, particles))
+        axes = range(3 * (force.box is not None))
+        return reach, [numbers.number(f"side {id(force)} {a}", _side(force, a)) for a in axes]
+
+    def _build(self) -> list[str]:
+        """The function that lists neighbours, unless there is one of the same text."""
+        search = self._search(self.force.box is not None)
+        mine = f"build{self.number}"
+        self._built = self._searches.setdefault("\n".join(search), mine)
+        return [f"@njit({self.flags})", f"def {mine}{search[0]}", *search[1:], "", ""] if self._built == mine else []
+
+    def _listed(self) -> list[str]:
+        """Statements that copy what the law reads, and find the neighbours anew where somebody has moved too far."""
+        law, loop = self._law, self.loop
+        reach, sides = self._reaches
         copy = [
             "moved = 0",
             f"for k in range(np.int64(chunk) * {CHUNK}, min(total, (np.int64(chunk) + 1) * {CHUNK})):",
@@ -285,12 +383,7 @@ class Pairs:
             f"K[{HEAD} + chunk] = moved",
         ]
         given = ["base", "s", "e", reach, *sides, *"HWKLNX", *"A" * self.one_way, "x"]
-        search = self._search(bool(sides))
-        mine = f"build{j}"
-        name = self._searches.setdefault("\n".join(search), mine)
-        printed = [f"@njit({self.flags})", f"def {mine}{search[0]}", *search[1:], "", ""] if name == mine else []
-        build = f"{name}({', '.join(given)})"
-        body = [
+        return [
             f"cut2 = {reach} * {reach}",
             f"slack2 = R({0.5 * SKIN} * {0.5 * SKIN}) * cut2",
             "room = K[1]",
@@ -298,7 +391,7 @@ class Pairs:
             "n = top + 1",
             "for turn in range(2):",
             "    if K[0] == 0:",
-            f"        problem = {build}",
+            f"        problem = {self._built}({', '.join(given)})",
             "        if problem == 1:",
             "            for k in range(3 * m):",
             "                F[3 * H[s + k // 3] + k % 3] = R(np.nan)",
@@ -313,14 +406,7 @@ class Pairs:
             "            K[0] = 0",
             "    if K[0] != 0:",
             "        break",
-            f"for chunk in {loop}(({self.acted} + {CHUNK - 1}) // {CHUNK}):",
-            f"    y = np.empty({(4 + len(more)) * PIECE}, R)",
-            f"    z = np.empty({law.sums * step}, R)",
-            f"    for r in range(np.int64(chunk) * {CHUNK}, min({self.acted}, (np.int64(chunk) + 1) * {CHUNK})):",
-            *indented(particle, 2),
-            "return status",
         ]
-        return "\n".join([*printed, *self._head(), *indented(body, 1), ""])
 
     def _search(self, periodic: bool) -> list[str]:
         """The function that sorts the particles into cells and lists the neighbours of each, from its arguments on.
@@ -593,13 +679,43 @@ class _Law:
         self, first: dict[str, str], second: dict[str, str], prefix: str
     ) -> tuple[list[str], list[str], list[str]]:
         """Statements for one pair, and the outputs for its first and for its second particle."""
-        places = {place: name for name, place in self.inputs.items()}
-        other = {name: places["21"["12".index(node)], q] for name, (node, q) in self.inputs.items()}
         both = expanded(self.program)
-        both.outputs += expanded(self.program, both, other).outputs
+        both.outputs += expanded(self.program, both, self._turned).outputs
         dtype, call = self.binder.dtype, self.binder.caller(both)
         lines, outputs = statements(both, self._names(first, second), f"{self.tag}{prefix}", dtype, call)
         return lines, outputs[: self.sums], outputs[self.sums :]
+
+    def slopes(
+        self, own: dict[str, str], other: dict[str, str], prefix: str
+    ) -> tuple[list[str], Slopes, Slopes, Slopes]:
+        """Statements for one pair, and the slopes of the force on its first particle by the state of the first, by that
+        of the second, and of the force on the second by the state of the first: (axis of the force, 0: x, 1: v, axis).
+        """
+        slopes = self.force.traced_slopes.program
+        both = expanded(slopes)
+        both.outputs += expanded(slopes, both, self._turned).outputs
+        dtype, call = self.binder.dtype, self.binder.caller(both)
+        lines, outputs = statements(both, self._names(own, other), f"{self.tag}{prefix}", dtype, call)
+        keys = [
+            (turn, node, i, q, c)
+            for turn in (0, 1)
+            for i in range(3)
+            for node in (0, 1)
+            for q in (0, 1)
+            for c in range(3)
+        ]
+        entry = dict(zip(keys, outputs, strict=True))
+        parts = (
+            {key[2:]: value for key, value in entry.items() if key[:2] == part} for part in ((0, 0), (0, 1), (1, 1))
+        )
+        first, second, turned = parts
+        return lines, first, second, turned
+
+    @property
+    def _turned(self) -> dict[str, str]:
+        """The input of the other particle, for each input of one."""
+        places = {place: name for name, place in self.inputs.items()}
+        return {name: places["21"["12".index(node)], q] for name, (node, q) in self.inputs.items()}
 
     def _names(self, first: dict[str, str], second: dict[str, str]) -> dict[str, str]:
         """Expressions of the law's inputs."""
@@ -642,6 +758,11 @@ class PairArrays:
         self._head = np.zeros(HEAD, np.int64)
         self._neighbours = np.zeros(0, np.int32)
         self._known: Any = None
+        self._blocks: list[Any] = []  # for implicit solvers; what is never used of them costs nothing
+        if pairs.implicit:
+            kernel = len(self._forces) // 3
+            slopes = np.zeros(SLOPES * kernel, dtype)
+            self._blocks = [np.zeros(2 * kernel, np.int64), np.zeros(0, np.int32), np.zeros(0, dtype), slopes]
 
     def arrays(self) -> list[Any]:
         """The kernel's arguments, in the order of `Pairs.arguments`; another cut-off makes it find neighbours anew."""
@@ -656,6 +777,7 @@ class PairArrays:
             self._reserve(int(self._head[2]))
         return [
             self.rows, self._work, self._forces, self._head, self._cells, self._neighbours, self._origin, *split,
+            *self._blocks,
         ]  # fmt: skip
 
     def _begin(self) -> None:
@@ -691,6 +813,13 @@ class PairArrays:
                 :, :each
             ]
         self._head[1], self._neighbours = room, grown
+        if self._blocks:
+            self._blocks[1:3] = np.empty(room * count, np.int32), np.empty(9 * room * count, self.particles.dtype)
+
+
+def has_slopes(force: PairForce, particles: Particles) -> bool:
+    """Whether implicit solvers have a kernel of a force."""
+    return force.reach(particles) is not None and force.finish is None and force.by is None
 
 
 def _rows(force: PairForce, particles: Particles, place: Rows) -> tuple[Rows, Rows]:

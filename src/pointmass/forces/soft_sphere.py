@@ -25,6 +25,9 @@ class SoftSphere(PairForce):
     k_s : stiffness [N/m], at least 0.
     k_d : damping [N s/m], at least 0.
     radius : of each ball [m]; by default the particle attribute `radius`.
+    onset : overlap over which the damping sets in [m], 0 = all of it at the first touch. The force then jumps there,
+        and the equations of an implicit step may have no solution: such solvers need an onset of some hundredths of a
+        radius.
     box : sides of a periodic box [m], each at least four times the largest radius.
     """
 
@@ -37,6 +40,7 @@ class SoftSphere(PairForce):
         radius: Scalar = "radius",
         box: tuple[float, float, float] | None = None,
         *,
+        onset: Scalar = 0.0,
         on: Selection = None,
         enabled: bool = True,
     ) -> None:
@@ -44,6 +48,7 @@ class SoftSphere(PairForce):
             Parameter("k_s", k_s, unit="N/m", at_least=0),
             Parameter("k_d", k_d, unit="N s/m", at_least=0),
             Parameter("radius", radius, unit="m", at_least=0),
+            Parameter("onset", onset, unit="m", at_least=0),
         ]
         super().__init__(parameters, on, enabled, box)
 
@@ -56,13 +61,16 @@ class SoftSphere(PairForce):
         return 2 * float(np.max(values, initial=0.0))
 
     @staticmethod
-    def law(x1: Any, v1: Any, m1: Any, x2: Any, v2: Any, m2: Any, t: Any, k_s: Any, k_d: Any, radius: Any) -> Any:
+    def law(
+        x1: Any, v1: Any, m1: Any, x2: Any, v2: Any, m2: Any, t: Any, k_s: Any, k_d: Any, radius: Any, onset: Any
+    ) -> Any:
         """Force of particle 2 on particle 1 [N]."""
         d = fn.sub(x1, x2)
         distance = fn.length(d)
         inverse = fn.inverse(distance)
         overlap = radius[0] + radius[1] - distance
-        push = k_s * overlap - k_d * inverse * fn.dot(fn.sub(v1, v2), d)
+        damping = k_d * fn.where(overlap < onset, overlap * fn.inverse(onset), 1.0)
+        push = k_s * overlap - damping * inverse * fn.dot(fn.sub(v1, v2), d)
         return fn.scale(fn.where(overlap > 0.0, push * inverse, 0.0), d)
 
     @staticmethod

@@ -95,6 +95,11 @@ class PairForce(Force):
             return None
         return trace(self._paired(self.potential), self._signature(), 1, f"{self.name} potential")
 
+    @cached_property
+    def traced_slopes(self) -> Traced:
+        """Slopes of the sums by x1, v1, x2 and v2, as a program."""
+        return self.traced.jacobian(*(n for a in "12" for q in "xv" for n in vector_names(f"{q}{a}")))
+
     @property
     def velocity_dependent(self) -> bool:
         finish = self.traced_finish
@@ -150,7 +155,7 @@ class PairForce(Force):
         count = len(self.traced.program.outputs)
         found = [(np.ravel(a), np.ravel(b)) for i, j in self._pairs(particles, x) for a, b in [_both(i, j)]]
         i, j = (np.concatenate([pair[k] for pair in found]) if found else rows[:0] for k in (0, 1))
-        parts = self._values(self._jacobian, particles, t, x, v, rows[i], others[j])
+        parts = self._values(self.traced_slopes, particles, t, x, v, rows[i], others[j])
         values = matrix(parts, len(i), x.dtype).reshape(-1, count, 2, 2, 3)  # sum, node, x|v, axis
         if self.finish is not None:
             sums = np.zeros((len(rows), count), x.dtype)
@@ -196,10 +201,6 @@ class PairForce(Force):
     def grow(self, particles: Particles, count: int) -> None:
         super().grow(particles, count)
         self.bind(particles)
-
-    @cached_property
-    def _jacobian(self) -> Traced:
-        return self.traced.jacobian(*(n for a in "12" for q in "xv" for n in vector_names(f"{q}{a}")))
 
     @cached_property
     def _finish_jacobian(self) -> Traced:

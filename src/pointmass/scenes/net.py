@@ -116,7 +116,7 @@ class NetScene(ShippedScene):
             names=["net", "balls", "frame"],
             forces=[
                 Gravity((0.0, -self.gravity, 0.0)),
-                SoftSphere(self.contact, k_d),
+                SoftSphere(self.contact, k_d, onset=0.25 * ROPE),
                 Drag(AIR, on="net"),
                 Springs(ids, 1.0, 0.0, lengths, family="frame"),
             ],
