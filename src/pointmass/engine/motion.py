@@ -18,7 +18,7 @@ from pointmass.solvers.splitting import Splitting
 from pointmass.system import ParticleSystem
 
 LANE = "i"  # index of a lane
-STATE = 7  # rows of the scratch before the columns: x, v, and who waits
+WAITS, BEFORE, STATE = 6, 7, 13  # rows of the scratch: x and v, who waits, x and v before the last steps, then columns
 W = 256  # lanes of a tile
 ONCE = "forceinline=True, **FLAGS"  # of what is called in one place: each array is seven arguments of a call
 AXES = "xyz"

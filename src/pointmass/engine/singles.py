@@ -17,7 +17,7 @@ from pointmass.engine import store
 from pointmass.engine.binding import Binder, equal_columns
 from pointmass.engine.contact import ClearLines
 from pointmass.engine.island import NOT_FINITE, Outcome, Span, entry_text, marked
-from pointmass.engine.motion import LANE, STATE, Flight, Lanes, Motion, W
+from pointmass.engine.motion import BEFORE, LANE, STATE, WAITS, Flight, Lanes, Motion, W
 from pointmass.engine.phases import REACHED
 from pointmass.engine.printing import function, indented
 from pointmass.engine.reference import KILLED
@@ -81,10 +81,10 @@ def keep(s, offset, x, lo, m):
 '''
 
 
-WAITS = f"""@njit(**FLAGS)
+WAITING = f"""@njit(**FLAGS)
 def somebody_waits(s, first, count):
     bits = s.view(BITS)
-    o = np.uintp({6 * W} + first)
+    o = np.uintp({WAITS * W} + first)
     any_bit = BITS(0)
     for j in range(count):
         any_bit |= bits[o + np.uintp(j)]
@@ -132,14 +132,19 @@ class SinglesKernel:
         long = timed or size > LONG or bool(motion.binder.functions)  # functions are longer than they look
         unrolled = [u for u in UNROLLED if u == 1 or not long]
         lanes = [self._unrolled(u, step, clear) for u in unrolled]
-        alone = "" if flight is None else flight.text + WAITS
+        alone = "" if flight is None else flight.text + WAITING
         return "".join([REACHED, motion.binder.functions, alone, TRANSPOSED, *lanes, self._run(unrolled, clear)])
 
     def _unrolled(self, count: int, step: list[str], clear: ClearLines | None) -> str:
         """The function that makes a few steps of all lanes, with the state in registers in between."""
         arguments = ", ".join([*self.shared, *(f"t{j}" for j in range(count + 1))])
         looks = [] if clear is None else self._looks(clear)
-        lines = [*self._head(count, clear), *looks, *_lanes(self._lane(count, step, clear)), "return status, waiting"]
+        lines = [
+            *self._head(count, clear),
+            *looks,
+            *_lanes(self._lane(count, step, clear)),
+            "return status, waiting",
+        ]
         return function(f"lanes{count}", arguments, "**FLAGS", lines)
 
     def _head(self, unrolled: int, clear: ClearLines | None) -> list[str]:
@@ -171,10 +176,14 @@ class SinglesKernel:
         return f"s[{(STATE + len(self.motion.binder.particle.getters) + k) * W} + {LANE}]"
 
     def _lane(self, unrolled: int, step: list[str], clear: ClearLines | None) -> list[str]:
-        """The steps of a lane; one that waits keeps its state."""
+        """The steps of a lane, and its state before them: one that waits goes back to it.
+
+        To write it only where a lane does not wait would be a store with a mask, which takes ten times as long without
+        AVX-512.
+        """
         motion = self.motion
         place = motion.entries
-        waiting = f"s[{6 * W} + {LANE}]"
+        waiting = f"s[{WAITS * W} + {LANE}]"
         keep = [f"{entry} = {name}" for name, entry in place.items()]
         first: list[str] = []
         between = motion.arrived()
@@ -187,7 +196,7 @@ class SinglesKernel:
                 between = [*clear.inner, *between]
                 moves = f"({motion.binder.attribute('w', LANE)} != R(0)) & " if motion.pins else ""
                 last += [*clear.end, f"waits = waits | ({moves}(not ({clear.result})))"]
-            keep = [f"{entry} = {entry} if waits else {name}" for name, entry in place.items()]
+            keep = [f"s[{(BEFORE + k) * W} + {LANE}] = {entry}" for k, entry in enumerate(place.values())] + keep
             keep.append(f"{waiting} = R(1) if waits else R(0)")
             keep.append("waiting |= waits")
         return [
@@ -201,7 +210,7 @@ class SinglesKernel:
 
     def _catch_up(self, flight: Flight) -> list[str]:
         """Statements that take those who waited over the `stride` steps that the others have made."""
-        waiting = f"s[{6 * W} + i]"
+        waiting = f"s[{WAITS * W} + i]"
         alive = " and died[lo + i] == 0" if self.deadly else ""
         marks = [f"died[lo + i] = 1 if events >= {KILLED} else 0"] if self.deadly else []
         marks += ["if events > 0:", "    hit[lo + i] = 1"] if self.watched else []
@@ -211,6 +220,8 @@ class SinglesKernel:
             f"    if not somebody_waits(s, bunch, {BUNCH}):",
             "        continue",
             f"    for i in range(bunch, bunch + {BUNCH}):",
+            f"        if {waiting} != 0:",
+            *(f"            s[{k * W} + i] = s[{(BEFORE + k) * W} + i]" for k in range(len(self.motion.entries))),
             f"        if {waiting} != 0 and i < m and bad == 0{alive}:",
             f"            bad, events = fly(np.uintp(i), {', '.join(flight.arrays)}, t0, dt, k, k + stride, {birth})",
             *indented(marks, 3),
@@ -227,13 +238,13 @@ class SinglesKernel:
         began, hold, caught = [], [], []
         if flight is not None:
             prepared = flight.scratch
-            began = [f"for i in range({W}):", f"    s[{6 * W} + i] = R(0)"]
+            began = [f"for i in range({W}):", f"    s[{WAITS * W} + i] = R(0)"]
             caught = ["if waiting:", *indented(self._catch_up(flight), 1)]
         if self.births:
             began += ["late = -np.inf", "for i in range(m):", "    late = max(late, birth[lo + i])"]
             hold = ["if late > t0 + k * dt:", "    for i in range(m):"]
             dead = " or died[lo + i] != 0" if self.deadly else ""
-            hold += [f"        s[{6 * W} + i] = R(1) if birth[lo + i] > t0 + k * dt{dead} else R(0)"]
+            hold += [f"        s[{WAITS * W} + i] = R(1) if birth[lo + i] > t0 + k * dt{dead} else R(0)"]
         steps = [*hold, "stride = 1"]
         for u in unrolled:
             times = ", ".join(f"t0 + (k + {j}) * dt" for j in range(u + 1))
