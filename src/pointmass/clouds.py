@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.errors import InvalidInput, finite_array, reading, whole_number
+from pointmass.foreign import shown_scene
 from pointmass.libraries import check_library
 
 Columns = dict[str, Any]
@@ -131,7 +132,7 @@ def _obj(file: Path, frame: int | None) -> Columns:
 def _glb(file: Path, frame: int | None) -> Columns:
     import trimesh
 
-    scene = trimesh.load_scene(file)
+    scene = shown_scene(file)
     parts = [
         trimesh.transform_points(scene.geometry[name].vertices, scene.graph[node][0]) for node, name in _nodes(scene)
     ]

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.errors import InvalidInput, finite_array, floats, reading, shown
+from pointmass.foreign import shown_scene
 
 Vertices = NDArray[np.float64]
 Faces = NDArray[np.int64]
@@ -177,26 +175,13 @@ def as_mesh(mesh: Any) -> TriangleMesh:
 
 def _contents(file: Path) -> tuple[Any, Any, Any]:
     """Vertices, faces and, if there are any, places on the pattern of a file as they stand there."""
-    import trimesh
-
-    if file.suffix.lower() == ".gltf":
-        document = json.loads(file.read_bytes())  # of one that is none, trimesh would read a `model.gltf` beside it
-        _check_inside(file, [item.get("uri", "") for what in ("buffers", "images") for item in document.get(what, [])])
-    found = trimesh.load(file, force="mesh", process=False)
-    if not isinstance(found, trimesh.Trimesh) or len(found.faces) == 0:
+    found = shown_scene(file).to_mesh()
+    if len(found.faces) == 0:
         raise InvalidInput("it holds no triangles")
     uv = getattr(found.visual, "uv", None)
     if uv is not None and np.asarray(uv).shape != (len(found.vertices), 2):
         uv = None
     return np.asarray(found.vertices), np.asarray(found.faces), uv
-
-
-def _check_inside(file: Path, names: Sequence[str]) -> None:
-    """Refuse a file that names others outside of its folder."""
-    folder = file.parent.resolve()
-    for name in names:
-        if not name.startswith("data:") and not (folder / unquote(name)).resolve().is_relative_to(folder):
-            raise InvalidInput(f"it names {shown(name)}, which is outside of its folder: put it there")
 
 
 def _numbers(faces: Any, count: int) -> Faces:
