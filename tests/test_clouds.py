@@ -77,6 +77,22 @@ def test_a_stage_in_centimetres_and_moved(tmp_path: Path) -> None:
     assert read_cloud(tmp_path / "a.usda").x.tolist() == [[1, 2, 0]]
 
 
+def test_a_stage_with_z_up_and_without_a_range_of_times(tmp_path: Path) -> None:
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.CreateNew(str(tmp_path / "a.usda"))
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(stage, 2.0)
+    points = UsdGeom.Points.Define(stage, "/a")
+    points.GetPointsAttr().Set([(1, 2, 3)], 7.0)
+    points.GetVelocitiesAttr().Set([(0, 0, 1)], 7.0)
+    points.GetWidthsAttr().Set([0.5], 7.0)
+    stage.Save()
+    cloud = read_cloud(tmp_path / "a.usda")
+    assert (cloud.x.tolist(), cloud.v.tolist()) == ([[2, 6, -4]], [[0, 2, 0]])
+    assert cloud.radius == pytest.approx(0.5)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "says"),
     [

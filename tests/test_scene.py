@@ -345,6 +345,88 @@ def test_paths_start_at_the_scene_file(tmp_path: Path, monkeypatch: pytest.Monke
         Scene(bodies=[pm.points([[0, 0, 0]])], forces=[pm.Wind(Flow(grid=grid))]).to_toml()
 
 
+BALL = '[[bodies]]\ntype = "points"\nx = [[0, 1, 0]]\n[[colliders]]\ntype = "mesh"\nmesh = '
+OUTSIDE = {
+    "an absolute path": (f"{BALL}'{{outside}}/ball.obj'", "mesh"),
+    "dots": (f"{BALL}'../outside/ball.obj'", "mesh"),
+    "a link to a file": (f"{BALL}'link.obj'", "mesh"),
+    "a link to a folder": (f"{BALL}'links/ball.obj'", "mesh"),
+    "links in a ring": (f"{BALL}'ring.obj/../../outside/ball.obj'", "mesh"),
+    "what is not there": (f"{BALL}'../nowhere.obj'", "mesh"),
+    "a cloud": ("[[bodies]]\ntype = 'cloud'\nfile = '../outside/ball.obj'", "file"),
+    "an emitter": ("[[emitters]]\ntype = 'mesh'\nmesh = '../outside/ball.obj'", "mesh"),
+    "ground": (f"{BALL}'ball.obj'\n[[colliders]]\ntype = 'height_field'\nheights = '../outside/a.npy'", "heights"),
+    "distances": (
+        f"{BALL}'ball.obj'\n[[colliders]]\ntype = 'distance_grid'\ndistances = '../outside/a.npz'",
+        "distances",
+    ),
+    "a grid": (f"{BALL}'ball.obj'\n[[forces]]\ntype = 'field'\ngrid = '../outside/a.npz'", "grid"),
+    "a grid in a wind": (
+        f"{BALL}'ball.obj'\n[[forces]]\ntype = 'wind'\nvelocity = [{{{{ type = 'flow', grid = '../a.npz' }}}}]",
+        "grid",
+    ),
+    "the path of a grid": (f"{BALL}'ball.obj'\n[[forces]]\ntype = 'field'\ngrid = {{{{ path = '../a.npz' }}}}", "path"),
+    "a solid in the air": (
+        f"{BALL}'ball.obj'\n[[forces]]\ntype = 'wind'\n[forces.velocity]\ntype = 'curl_noise'\n"
+        "around = [{{ type = 'mesh', mesh = '../outside/ball.obj' }}]",
+        "mesh",
+    ),
+}
+
+
+@pytest.fixture
+def folders(tmp_path: Path) -> Path:
+    """A folder for scenes with links that lead out, and one beside it with files."""
+    inside, outside = tmp_path / "inside", tmp_path / "outside"
+    inside.mkdir()
+    outside.mkdir()
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+    for folder in (inside, outside):
+        (folder / "ball.obj").write_text(text)
+    (inside / "link.obj").symlink_to(outside / "ball.obj")
+    (inside / "links").symlink_to(outside)
+    (inside / "ring.obj").symlink_to("ring.obj")
+    return tmp_path
+
+
+@pytest.mark.parametrize(("text", "name"), OUTSIDE.values(), ids=OUTSIDE)
+def test_scene_files_name_nothing_outside_of_their_folder(text: str, name: str, folders: Path) -> None:
+    scene = folders / "inside" / "a.toml"
+    scene.write_text(text.format(outside=folders / "outside"))
+    with pytest.raises(InvalidInput, match=rf" {name} = '.*' is not allowed: it must lie in the scene file's folder"):
+        Scene.load(scene)
+
+
+def test_files_outside_of_the_folder_may_be_allowed(folders: Path) -> None:
+    scene = folders / "inside" / "a.toml"
+    scene.write_text(f"{BALL}'../outside/ball.obj'\n")
+    loaded = Scene.load(scene, allow_outside=True)
+    assert loaded.colliders[0].arguments["mesh"] == str((folders / "outside" / "ball.obj").resolve())
+    assert Scene.load(scene, {"colliders.0.mesh": str(folders / "outside" / "ball.obj")}) == loaded  # the user's word
+    assert Scene.from_toml(loaded.to_toml()) == loaded  # as a cache keeps it, for which its user was asked
+    with pytest.raises(InvalidInput, match="folder or below"):
+        Scene.load(scene, {"colliders.0.friction": 0.5})
+    scene.write_text(f"{BALL}'ball.obj'\n[[forces]]\ntype = 'field'\ngrid = {{ path = '../a.npz' }}\n")
+    with pytest.raises(InvalidInput, match="folder or below"):
+        Scene.load(scene, {"forces.0.grid.outside": "wrap"})
+
+
+@pytest.mark.parametrize("path", ["ball.obj", "../inside/ball.obj", "deep/ball.obj", "deep/link.obj"])
+def test_files_below_the_folder_are_found_through_links_too(
+    path: str, folders: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    inside = folders / "inside"
+    (inside / "deep").mkdir()
+    (inside / "deep" / "ball.obj").write_bytes((inside / "ball.obj").read_bytes())
+    (inside / "deep" / "link.obj").symlink_to("../ball.obj")
+    (inside / "a.toml").write_text(f"{BALL}{path!r}\n")
+    (folders / "way").symlink_to(inside)
+    for place in (inside / "a.toml", folders / "way" / "a.toml"):
+        assert len(Scene.load(place).colliders) == 1
+    monkeypatch.chdir(inside)
+    assert len(Scene.load("a.toml").colliders) == 1
+
+
 def test_settings_reach_into_the_text() -> None:
     text = dumps(scene_with("forces", {"type": "gravity"}))
     scene = Scene.from_toml(text, {"forces.0.k": 0.7, "dt": 0.5, "look.color": "red", "solver.type": "rk4"})

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.errors import InvalidInput, finite_array, reading, whole_number
+from pointmass.foreign import last_time, open_stage, poly_data, shown_prims, shown_scene, to_world
 from pointmass.libraries import check_library
 
 Columns = dict[str, Any]
@@ -131,7 +132,7 @@ def _obj(file: Path, frame: int | None) -> Columns:
 def _glb(file: Path, frame: int | None) -> Columns:
     import trimesh
 
-    scene = trimesh.load_scene(file)
+    scene = shown_scene(file)
     parts = [
         trimesh.transform_points(scene.geometry[name].vertices, scene.graph[node][0]) for node, name in _nodes(scene)
     ]
@@ -149,15 +150,9 @@ def _nodes(scene: Any) -> list[tuple[str, str]]:
 
 def _vtp(file: Path, frame: int | None) -> Columns:
     from vtkmodules.util import numpy_support
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
 
     array_of: Any = numpy_support.vtk_to_numpy
-    reader = vtkXMLPolyDataReader()
-    reader.SetFileName(str(file))
-    reader.Update()
-    if reader.GetErrorCode():
-        raise ValueError(reader.GetErrorCode())
-    mesh = reader.GetOutput()
+    mesh = poly_data(file)
     columns = {"v": "velocity", "radius": "radius", "ids": "id"}
     arrays = {name: mesh.GetPointData().GetArray(column) for name, column in columns.items()}
     found = {name: array_of(array) for name, array in arrays.items() if array is not None}
@@ -174,38 +169,29 @@ def _gsd(file: Path, frame: int | None) -> Columns:
 
 
 def _usd(file: Path, frame: int | None) -> Columns:
-    from pxr import Tf, Usd, UsdGeom
+    from pxr import Usd, UsdGeom
 
-    try:
-        stage = Usd.Stage.Open(str(file))
-    except Tf.ErrorException as error:
-        raise ValueError(str(error)) from None
-    first, last = int(stage.GetStartTimeCode()), int(stage.GetEndTimeCode())
-    time = (
-        Usd.TimeCode(first + _at(frame, last - first + 1))
-        if stage.HasAuthoredTimeCodeRange()
-        else Usd.TimeCode.Default()
-    )
-    scale = UsdGeom.GetStageMetersPerUnit(stage)
-    prims = [UsdGeom.Points(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Points)]
-    shown = [prim for prim in prims if prim.ComputeVisibility(time) != UsdGeom.Tokens.invisible]
-    parts = [_usd_points(prim, time, scale) for prim in shown]
+    stage = open_stage(file)
+    time = last_time(stage)
+    if stage.HasAuthoredTimeCodeRange():
+        first, last = int(stage.GetStartTimeCode()), int(stage.GetEndTimeCode())
+        time = Usd.TimeCode(first + _at(frame, last - first + 1))
+    parts = [_usd_points(prim, time, *to_world(stage, prim, time)) for prim in shown_prims(stage, UsdGeom.Points, time)]
     if not parts:
         raise InvalidInput("it holds no points")
     common = set.intersection(*(set(part) for part in parts))
     return {name: np.concatenate([part[name] for part in parts]) for name in common}
 
 
-def _usd_points(prim: Any, time: Any, scale: float) -> Columns:
+def _usd_points(prim: Any, time: Any, turn: NDArray[np.float64], shift: NDArray[np.float64]) -> Columns:
     """The points of a prim where it stands in the world."""
-    to_world = np.array(prim.ComputeLocalToWorldTransform(time))
     x = np.array(prim.GetPointsAttr().Get(time), np.float64).reshape(-1, 3)
-    found: Columns = {"x": scale * (x @ to_world[:3, :3] + to_world[3, :3])}
+    found: Columns = {"x": x @ turn + shift}
     velocities, widths, ids = (a.Get(time) for a in (prim.GetVelocitiesAttr(), prim.GetWidthsAttr(), prim.GetIdsAttr()))
     if velocities is not None and len(velocities) == len(x):
-        found["v"] = scale * (np.array(velocities, np.float64) @ to_world[:3, :3])
+        found["v"] = np.array(velocities, np.float64) @ turn
     if widths is not None and len(widths) == len(x):
-        found["radius"] = scale * np.array(widths, np.float64) / 2
+        found["radius"] = np.cbrt(abs(np.linalg.det(turn))) * np.array(widths, np.float64) / 2
     if ids is not None and len(ids) == len(x):
         found["ids"] = np.array(ids)
     return found

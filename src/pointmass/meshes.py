@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.errors import InvalidInput, finite_array, floats, reading, shown
+from pointmass.foreign import last_time, open_stage, poly_data, shown_prims, shown_scene, to_world
+from pointmass.libraries import check_library
 
 Vertices = NDArray[np.float64]
 Faces = NDArray[np.int64]
-FORMATS = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off")
 SAME = 1e-9  # of a mesh's size: vertices nearer to each other are one
 FLAT = 1e-12  # of the square of its longest edge: a triangle of less area is none
 FILLED = 1 - 1e-9  # of the volume of its convex hull: a mesh that fills as much is convex
@@ -123,16 +122,23 @@ def read_mesh(path: str | Path) -> TriangleMesh:
 
     Parameters
     ----------
-    path : `.obj`, `.ply`, `.stl`, `.glb`, `.gltf` or `.off`. Larger polygons are cut into triangles. Lengths are taken
-        as [m], and the file's y axis is up.
+    path : `.obj`, `.ply`, `.stl`, `.glb`, `.gltf`, `.off`, `.vtp`, `.usd`, `.usda` or `.usdc`. Larger polygons are cut
+        into triangles. Lengths are taken as [m], and the file's y axis is up, unless it is of USD and says something
+        else. Of a USD stage all meshes are taken that are seen in its last frame.
 
     Raises
     ------
     InvalidInput
-        No such file, a file of another kind or cut off, no triangles in it, a vertex that is not finite.
+        No such file, a file of another kind or cut off, a library that is not installed, no triangles in it, a vertex
+        that is not finite, a name of a file outside of its folder.
     """
-    with reading("mesh", path, FORMATS) as file:
-        return triangle_mesh(*_contents(file))
+    with reading("mesh", path, tuple(READERS)) as file:
+        suffix = file.suffix.lower()
+        check_library("reading", suffix)
+        vertices, faces, uv = READERS[suffix](file)
+        if len(faces) == 0:
+            raise InvalidInput("it holds no triangles")
+        return triangle_mesh(vertices, faces, uv)
 
 
 def triangle_mesh(vertices: Any, faces: Any, uv: Any = None) -> TriangleMesh:
@@ -175,28 +181,98 @@ def as_mesh(mesh: Any) -> TriangleMesh:
     )
 
 
-def _contents(file: Path) -> tuple[Any, Any, Any]:
-    """Vertices, faces and, if there are any, places on the pattern of a file as they stand there."""
-    import trimesh
+Contents = tuple[Any, Any, Any]  # vertices, triangles, and places on the pattern or None, as they stand in a file
 
-    if file.suffix.lower() == ".gltf":
-        document = json.loads(file.read_bytes())  # of one that is none, trimesh would read a `model.gltf` beside it
-        _check_inside(file, [item.get("uri", "") for what in ("buffers", "images") for item in document.get(what, [])])
-    found = trimesh.load(file, force="mesh", process=False)
-    if not isinstance(found, trimesh.Trimesh) or len(found.faces) == 0:
-        raise InvalidInput("it holds no triangles")
+
+def _by_trimesh(file: Path) -> Contents:
+    found = shown_scene(file).to_mesh()
     uv = getattr(found.visual, "uv", None)
     if uv is not None and np.asarray(uv).shape != (len(found.vertices), 2):
         uv = None
     return np.asarray(found.vertices), np.asarray(found.faces), uv
 
 
-def _check_inside(file: Path, names: Sequence[str]) -> None:
-    """Refuse a file that names others outside of its folder."""
-    folder = file.parent.resolve()
-    for name in names:
-        if not name.startswith("data:") and not (folder / unquote(name)).resolve().is_relative_to(folder):
-            raise InvalidInput(f"it names {shown(name)}, which is outside of its folder: put it there")
+def _vtp(file: Path) -> Contents:
+    from vtkmodules.util import numpy_support
+
+    array_of: Any = numpy_support.vtk_to_numpy
+    found = poly_data(file)
+    cells = found.GetPolys()
+    corners, offsets = array_of(cells.GetConnectivityArray()), array_of(cells.GetOffsetsArray())
+    points = np.zeros((0, 3)) if found.GetPoints() is None else array_of(found.GetPoints().GetData())
+    places = found.GetPointData().GetTCoords()
+    uv = None if places is None or places.GetNumberOfComponents() != 2 else array_of(places)
+    return points, corners[_fans(np.diff(offsets), len(corners))], uv
+
+
+def _usd(file: Path) -> Contents:
+    from pxr import UsdGeom
+
+    stage = open_stage(file)
+    time = last_time(stage)
+    parts = [_usd_mesh(stage, prim, time) for prim in shown_prims(stage, UsdGeom.Mesh, time)]
+    if not parts:
+        raise InvalidInput("it holds no triangles")
+    before = np.cumsum([0, *(len(points) for points, *_ in parts)])
+    faces = [corners + first for (_, corners, _), first in zip(parts, before, strict=False)]
+    uvs = [np.zeros((len(corners), 3, 2)) if uv is None else uv for _, corners, uv in parts]
+    patterned = any(uv is not None for *_, uv in parts)
+    points = np.concatenate([points for points, *_ in parts])
+    return points, np.concatenate(faces), np.concatenate(uvs) if patterned else None
+
+
+def _usd_mesh(stage: Any, mesh: Any, time: Any) -> Contents:
+    """A mesh where it stands in the world."""
+    from pxr import UsdGeom
+
+    attributes = (mesh.GetPointsAttr(), mesh.GetFaceVertexIndicesAttr(), mesh.GetFaceVertexCountsAttr())
+    points, corners, counts = (np.array([] if (value := a.Get(time)) is None else value) for a in attributes)
+    corners = corners.astype(np.int64)
+    turn, shift = to_world(stage, mesh, time)
+    fans = _fans(counts.astype(np.int64), len(corners))
+    if (mesh.GetOrientationAttr().Get(time) == UsdGeom.Tokens.leftHanded) != (np.linalg.det(turn) < 0):
+        fans = fans[:, ::-1]
+    uv = _usd_pattern(mesh, time)
+    if uv is not None and len(uv) == len(corners):
+        uv = uv[fans]
+    elif uv is not None:
+        uv = uv[corners[fans]]
+    return points.reshape(-1, 3) @ turn + shift, corners[fans], uv
+
+
+def _usd_pattern(mesh: Any, time: Any) -> NDArray[np.float64] | None:
+    """Places of all corners, or else of all points, on the first pattern of a mesh."""
+    from pxr import Sdf, UsdGeom
+
+    kinds = (Sdf.ValueTypeNames.TexCoord2fArray, Sdf.ValueTypeNames.TexCoord2dArray, Sdf.ValueTypeNames.TexCoord2hArray)
+    many = (UsdGeom.Tokens.faceVarying, UsdGeom.Tokens.vertex, UsdGeom.Tokens.varying)
+    for primvar in UsdGeom.PrimvarsAPI(mesh).GetPrimvarsWithValues():
+        if primvar.GetTypeName() in kinds and primvar.GetInterpolation() in many:
+            return np.array(primvar.ComputeFlattened(time), np.float64).reshape(-1, 2)
+    return None
+
+
+def _fans(counts: NDArray[np.int64], total: int) -> Faces:
+    """Polygons cut into triangles from their first corners, as numbers of corners, shape (k, 3).
+
+    Parameters
+    ----------
+    counts : of the corners of each polygon, one after another; there are `total`.
+    """
+    if not ((counts >= 0) & (counts <= total)).all() or counts.sum() != total:  # a sum of huge ones may wrap around
+        raise InvalidInput("its polygons have other corners than it says")
+    first, triangles = np.cumsum(counts) - counts, np.maximum(counts - 2, 0)
+    which = np.repeat(np.arange(len(counts)), triangles)
+    along = np.arange(len(which)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    fans: Faces = first[which, None] + np.stack([0 * along, along + 1, along + 2], axis=1)
+    return fans
+
+
+READERS: dict[str, Callable[[Path], Contents]] = {
+    **dict.fromkeys((".obj", ".ply", ".stl", ".glb", ".gltf", ".off"), _by_trimesh),
+    ".vtp": _vtp,
+    **dict.fromkeys((".usd", ".usda", ".usdc"), _usd),
+}
 
 
 def _numbers(faces: Any, count: int) -> Faces:

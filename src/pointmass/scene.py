@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import asdict, dataclass, field, fields, replace
+from os.path import realpath
 from pathlib import Path
 from typing import Any, Literal
 
@@ -213,18 +214,27 @@ class Scene:
     __hash__ = None  # type: ignore[assignment]
 
     @classmethod
-    def from_toml(cls, text: str, settings: Mapping[str, Any] | None = None, folder: Path | None = None) -> Scene:
+    def from_toml(
+        cls,
+        text: str,
+        settings: Mapping[str, Any] | None = None,
+        folder: Path | None = None,
+        *,
+        allow_outside: bool = False,
+    ) -> Scene:
         """A scene from TOML.
 
         Parameters
         ----------
         settings : values to change before it is read, by path, such as {"forces.0.k": 0.2}.
-        folder : where the paths of files in it start.
+        folder : where the paths of files in it start, and in which those files are.
+        allow_outside : whether they may be elsewhere, too. Those that `settings` name always may, and so may all where
+            there is no `folder`.
 
         Raises
         ------
         InvalidInput
-            Not TOML, an unknown key or kind, a value that is not allowed.
+            Not TOML, an unknown key or kind, a value that is not allowed, a file outside of the folder.
         """
         import tomllib
 
@@ -234,11 +244,17 @@ class Scene:
             raise InvalidInput(f"the scene is not TOML: {error}") from None
         for path, value in (settings or {}).items():
             _set(document, path, value)
-        return cls.from_document(document, folder)
+        return cls._from_document(document, _Files(folder, allow_outside, tuple(settings or ())))
 
     @classmethod
-    def from_document(cls, document: Mapping[str, Any], folder: Path | None = None) -> Scene:
-        """A scene from plain tables, as `document` makes them."""
+    def from_document(
+        cls, document: Mapping[str, Any], folder: Path | None = None, *, allow_outside: bool = False
+    ) -> Scene:
+        """A scene from plain tables, as `document` makes them; see `from_toml`."""
+        return cls._from_document(document, _Files(folder, allow_outside))
+
+    @classmethod
+    def _from_document(cls, document: Mapping[str, Any], files: _Files) -> Scene:
         from pointmass.schema import checked  # pydantic, which a scene written in Python does without
 
         checked(document)
@@ -246,7 +262,7 @@ class Scene:
         named = [table.pop("name", None) for table in tables["bodies"]]
         numbered = _numbered([table["type"] for table in tables["bodies"]])
         made: dict[str, Any] = {
-            what: [_made(registry, table, f"{what}.{k}", folder) for k, table in enumerate(tables[what])]
+            what: [_made(registry, table, f"{what}.{k}", files) for k, table in enumerate(tables[what])]
             for what, registry in LISTS.items()
         }
         return cls(
@@ -259,15 +275,25 @@ class Scene:
         )
 
     @classmethod
-    def load(cls, path: str | Path, settings: Mapping[str, Any] | None = None) -> Scene:
-        """A scene from a TOML file."""
+    def load(cls, path: str | Path, settings: Mapping[str, Any] | None = None, *, allow_outside: bool = False) -> Scene:
+        """A scene from a TOML file.
+
+        Parameters
+        ----------
+        settings, allow_outside : see `from_toml`; the folder is that of the file.
+
+        Raises
+        ------
+        InvalidInput
+            It cannot be read, or as for `from_toml`.
+        """
         path = Path(path)
         try:
             text = path.read_text(encoding="utf-8-sig")  # some editors on Windows begin a file with a mark
         except (OSError, UnicodeDecodeError) as error:
             reason = getattr(error, "strerror", None) or "it is not text in UTF-8"
             raise InvalidInput(f"cannot read the scene {str(path)!r}: {reason}") from None
-        return cls.from_toml(text, settings, path.parent)
+        return cls.from_toml(text, settings, path.parent, allow_outside=allow_outside)
 
     def changed(self, **values: Any) -> Scene:
         """A copy with other values, such as `scene.changed(dt=1e-3)`."""
@@ -410,27 +436,69 @@ def _way(path: str | Path, folder: Path | None) -> str:
 # ------------------------------------------------------------------------------------------------------- from tables
 
 
-def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, folder: Path | None) -> Any:
-    """The object that a table describes; paths start at `folder`."""
+@dataclass(frozen=True)
+class _Files:
+    """Where the files are that a text names.
+
+    Attributes
+    ----------
+    folder : where their paths start, None = where the program runs.
+    allow_outside : whether they may be outside of the folder.
+    chosen : parameters, such as "colliders.0.mesh", whose values are not of the text: these files may be anywhere.
+    """
+
+    folder: Path | None = None
+    allow_outside: bool = False
+    chosen: Sequence[str] = ()
+
+    def found(self, where: str, path: str) -> str:
+        """A path such that it is found again from wherever this scene, or a cache that keeps its text, is read.
+
+        Parameters
+        ----------
+        where : the parameter that has it, such as "colliders.0.mesh".
+
+        Raises
+        ------
+        InvalidInput
+            It cannot be a path, or leads out of the folder.
+        """
+        name = where.rpartition(".")[2]
+        if "\0" in path:
+            raise InvalidInput(f"{name} = {path!r} is not allowed: no file has a name with a zero character")
+        if self.folder is None:
+            return path
+        folder, place = (Path(realpath(way)) for way in (self.folder, self.folder / path))  # through all links
+        chosen = any(f"{where}.".startswith(f"{way}.") for way in self.chosen)  # this value, or a table around it
+        if not (self.allow_outside or chosen or place.is_relative_to(folder)):
+            raise InvalidInput(
+                f"{name} = {path!r} is not allowed: it must lie in the scene file's folder or below; copy it there, or "
+                "allow it by --allow-outside (in Python, allow_outside=True)"
+            )
+        return str(place)
+
+
+def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, files: _Files) -> Any:
+    """The object that a table describes."""
     values = dict(table)
     kind = values.pop("type")
     try:
         for name in VELOCITIES:
             if isinstance(values.get(name), Mapping):
-                values[name] = _made(FORCES, values[name], f"{where}.{name}", folder)
+                values[name] = _made(FORCES, values[name], f"{where}.{name}", files)
             if isinstance(values.get(name), list):
                 values[name] = [
-                    _made(FORCES, part, f"{where}.{name}.{k}", folder) if isinstance(part, Mapping) else part
+                    _made(FORCES, part, f"{where}.{name}.{k}", files) if isinstance(part, Mapping) else part
                     for k, part in enumerate(values[name])
                 ]
         if "around" in values:
             solids = enumerate(values["around"])
-            values["around"] = [_made(COLLIDERS, solid, f"{where}.around.{k}", folder) for k, solid in solids]
+            values["around"] = [_made(COLLIDERS, solid, f"{where}.around.{k}", files) for k, solid in solids]
         if "grid" in values:
-            values["grid"] = _grid(values["grid"], folder)
+            values["grid"] = _grid(values["grid"], f"{where}.grid", files)
         for name in FILES:
             if isinstance(values.get(name), str):
-                values[name] = _found(name, values[name], folder)
+                values[name] = files.found(f"{where}.{name}", values[name])
         return registry[kind](**values)
     except InvalidInput as error:
         raise InvalidInput(f"{where} ({kind}): {error}") from None
@@ -440,17 +508,10 @@ def _made(registry: Mapping[str, Any], table: Mapping[str, Any], where: str, fol
         ) from None
 
 
-def _grid(value: Any, folder: Path | None) -> Any:
-    settings = dict(value) if isinstance(value, Mapping) else {"path": value}
-    path = _found("grid", str(settings.pop("path")), folder)
+def _grid(value: Any, where: str, files: _Files) -> Any:
+    settings = dict(value) if isinstance(value, Mapping) else {}
+    path = files.found(f"{where}.path", settings.pop("path")) if settings else files.found(where, str(value))
     return load_grid(path, **settings) if settings else path
-
-
-def _found(name: str, path: str, folder: Path | None) -> str:
-    """A path such that it is found again from wherever this scene, or a cache that keeps its text, is read."""
-    if "\0" in path:
-        raise InvalidInput(f"{name} = {path!r} is not allowed: no file has a name with a zero character")
-    return path if folder is None else str((folder / path).resolve())
 
 
 def _made_solver(value: Any) -> Solver | Literal["auto"] | None:

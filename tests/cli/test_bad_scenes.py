@@ -55,3 +55,25 @@ def test_what_turns_bad_in_the_run_keeps_the_frames_before(tmp_path: Path, monke
     done = CliRunner().invoke(main, ["render", "bad.toml", "-o", "b.mp4"], catch_exceptions=False)
     assert (done.exit_code, done.stderr.count("\n")) == (2, 1)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["b.zarr", "bad.toml"]
+
+
+def test_files_elsewhere_are_read_only_if_the_command_allows_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "cloud.csv").write_text("x,y,z\n0,1,0\n")
+    Path("scenes/a.toml").write_text('frames = 2\n[[bodies]]\ntype = "cloud"\nfile = "../cloud.csv"\n')
+
+    def ran(*words: str) -> tuple[int, str]:
+        done = CliRunner().invoke(main, list(words), catch_exceptions=False)
+        return done.exit_code, done.stderr or done.stdout
+
+    code, said = ran("run", "scenes/a.toml")
+    assert (code, said.count("\n")) == (2, 1)
+    assert "bodies.0 (cloud): file = '../cloud.csv' is not allowed" in said
+    assert "--allow-outside" in said
+    assert ran("run", "scenes/a.toml", "--allow-outside")[0] == 0
+    assert ran("run", "scenes/a.toml", "--set", "bodies.0.file=../cloud.csv", "-o", "b.zarr")[0] == 0
+    assert ran("why", "a.zarr")[0] == 2  # a cache of a stranger does not decide what may be read
+    assert "nothing has changed" in ran("why", "a.zarr", "--allow-outside")[1]

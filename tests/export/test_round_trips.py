@@ -172,7 +172,8 @@ def test_a_frame_may_be_empty(tmp_path: Path, name: str, read: Callable[[Path], 
 
 
 def test_every_kind_of_all_frames_is_read_back() -> None:
-    tried = {Path(name).suffix for name, *_ in FORMATS} | {".usdc", ".vtp", ".obj", ".glb"}  # as .usd and .pvd; meshes
+    elsewhere = {".usdc", ".vtp", ".obj", ".glb"}  # as .usd and .pvd; meshes; test_glb.py
+    tried = {Path(name).suffix for name, *_ in FORMATS} | elsewhere
     assert tried == set(EXPORTERS)
 
 
@@ -302,7 +303,7 @@ def test_a_film_has_its_frames(tmp_path: Path, frames: list[Frame], name: str) -
     assert shapes == [(48, 64, 3)] * 5
 
 
-@pytest.mark.parametrize("suffix", ["npz", "csv", "gsd", "pvd", "usd"])  # of USD only what Python sees
+@pytest.mark.parametrize("suffix", ["npz", "csv", "gsd", "pvd", "usd", "glb"])  # of USD only what Python sees
 def test_frames_are_let_go(tmp_path: Path, suffix: str) -> None:
     """A run of 24 frames takes no more memory than one of 4, beyond two arrays."""
     n = 2_000 if suffix == "csv" else 10_000

@@ -8,13 +8,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import pyvista
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import pointmass as pm
 from pointmass.cli.memory import limited
 from pointmass.errors import InvalidInput
-from pointmass.meshes import FORMATS, TriangleMesh, read_mesh
+from pointmass.export import export
+from pointmass.libraries import NEEDED
+from pointmass.meshes import READERS, TriangleMesh, read_mesh
 from tests.fuzz.mutations import QUICK, damages, refused_or_right
 
 
@@ -22,7 +26,8 @@ from tests.fuzz.mutations import QUICK, damages, refused_or_right
 def meshes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     folder = tmp_path_factory.mktemp("meshes")
     made = {}
-    for suffix in FORMATS:
+    cloth = next(iter(pm.Scene(bodies=[pm.cloth(4, 4)]).simulation().frames(1)))
+    for suffix in READERS:
         box = trimesh.creation.icosphere(1)
         if suffix == ".gltf":
             files = trimesh.Scene(box).export(file_type="gltf")
@@ -32,9 +37,14 @@ def meshes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
             document = json.loads(files["model.gltf"])
             document["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
             made[suffix] = json.dumps(document).encode()
+        elif suffix in NEEDED:
+            export([cloth], folder / f"a{suffix}")
+            made[suffix] = (folder / f"a{suffix}").read_bytes()
         else:
             box.export(folder / f"a{suffix}")
             made[suffix] = (folder / f"a{suffix}").read_bytes()
+    pyvista.wrap(trimesh.creation.box()).save(folder / "ascii.vtp", binary=False)
+    made["ascii.vtp"] = (folder / "ascii.vtp").read_bytes()
     made["ascii.ply"] = trimesh.exchange.ply.export_ply(trimesh.creation.box(), encoding="ascii")
     made["ascii.stl"] = trimesh.exchange.stl.export_stl_ascii(trimesh.creation.box()).encode()
     return made

@@ -36,9 +36,9 @@ def command(source: str, output: str, frame: int | None, as_json: bool, quiet: b
     """Write the frames of a cache, or of a scene, for other programs.
 
     The ending of OUT says how: .usd, .usdc or .usda for Blender, Houdini and Maya; .pvd (and a .vtp for each frame) or
-    .vtkhdf for ParaView; .gsd for OVITO; .npz and .csv for arrays and tables; .vtp, .ply, .obj or .glb for the last
-    frame, or for each one with a name such as x_%04d.ply; .mp4, .webm, .gif or x_%04d.png for a film, see pointmass
-    render; .html for a page that plays the run anywhere.
+    .vtkhdf for ParaView; .gsd for OVITO; .glb for web pages and game engines; .npz and .csv for arrays and tables;
+    .vtp, .ply or .obj for the last frame, or for each one with a name such as x_%04d.ply; .mp4, .webm, .gif or
+    x_%04d.png for a film, see pointmass render; .html for a page that plays the run anywhere.
     """
     options, path = RunOptions(**values), Path(output)
     report = Report(command="export", path=path)

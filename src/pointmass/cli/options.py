@@ -36,6 +36,7 @@ class RunOptions:
     ----------
     settings : of `--set`, each "name=value".
     threads : of Numba; changes no result.
+    allow_outside : whether a scene file may name files outside of its folder.
     """
 
     frames: int | None = None
@@ -47,6 +48,7 @@ class RunOptions:
     dtype: str | None = None
     preset: str | None = None
     threads: int | None = None
+    allow_outside: bool = False
     settings: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
@@ -73,6 +75,7 @@ def run_options(command: Command) -> Command:
             click.option("--dtype", help="float64 or float32."),
             click.option("--preset", help="Of a shipped scene, such as geyser of fountain; see pointmass list."),
             click.option("--threads", type=int, envvar="POINTMASS_THREADS", help="Threads; the result is the same."),
+            click.option("--allow-outside", is_flag=True, help="A scene file may name files outside of its folder."),
             click.option(
                 "--set",
                 "settings",
@@ -95,7 +98,7 @@ def load_scene(source: str, options: RunOptions) -> Scene:
         No such scene, a file that is no scene, an option that is not allowed.
     """
     _prepare(options)
-    return _with_options(_described(source, _settings(options.settings), options.preset), options)
+    return _with_options(_described(source, options), options)
 
 
 def load_subject(source: str, options: RunOptions) -> Subject:
@@ -142,8 +145,8 @@ def _prepare(options: RunOptions) -> None:
         raise InvalidInput("--dt and --substeps both set the step: give one of them")
 
 
-def _described(source: str, settings: dict[str, Any], preset: str | None) -> Scene:
-    path = Path(source)
+def _described(source: str, options: RunOptions) -> Scene:
+    path, settings, preset = Path(source), _settings(options.settings), options.preset
     if path.suffix == ".toml" or path.is_file():
         if preset is not None:
             raise InvalidInput(
@@ -151,7 +154,7 @@ def _described(source: str, settings: dict[str, Any], preset: str | None) -> Sce
             )
         from pointmass.scene import Scene
 
-        return Scene.load(path, settings)
+        return Scene.load(path, settings, allow_outside=options.allow_outside)
     from pointmass.scenes import SCENES
 
     kind = shipped(source)

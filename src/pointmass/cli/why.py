@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -31,7 +32,8 @@ def command(cache: str, scene: str | None, as_json: bool, **values: Any) -> None
     opened = Cache.open(cache)
     options = RunOptions(**values)
     if scene is None:
-        scene, options = _source(opened)
+        scene, told = _source(opened)
+        options = replace(told, allow_outside=options.allow_outside)  # a cache of others does not decide that
     now = load_scene(scene, options)
     found = plan(cache, now.simulation(), now, now.fps)
     if as_json:

@@ -16,8 +16,9 @@ class Mesh(Triangulated):
 
     Parameters
     ----------
-    mesh : the path of an `.obj`, `.ply`, `.stl`, `.glb`, `.gltf` or `.off` file, or a pair (vertices [m], shape (n, 3);
-        faces, three numbers of vertices each, shape (k, 3)). Vertices at the same place count as one.
+    mesh : the path of an `.obj`, `.ply`, `.stl`, `.glb`, `.gltf`, `.off`, `.vtp` or `.usd` file, or a pair (vertices
+        [m], shape (n, 3); faces, three numbers of vertices each, shape (k, 3)). Vertices at the same place count as
+        one.
     scale : the factor to metres, above 0.
     thickness : of an open mesh [m], at least eps; its triangles are in the middle.
     inside : whether the free space is inside of a closed mesh.

@@ -24,8 +24,8 @@ class MeshEmitter(ShapedEmitter):
 
     Parameters
     ----------
-    mesh : the path of an `.obj`, `.ply`, `.stl`, `.glb`, `.gltf` or `.off` file, or a pair (vertices [m], shape (n, 3);
-        faces, shape (k, 3)). It is moved by `position`.
+    mesh : the path of an `.obj`, `.ply`, `.stl`, `.glb`, `.gltf`, `.off`, `.vtp` or `.usd` file, or a pair (vertices
+        [m], shape (n, 3); faces, shape (k, 3)). It is moved by `position`.
     where : "surface", or the "volume" of a closed mesh.
 
     Raises

@@ -9,8 +9,9 @@ from pathlib import Path
 from pointmass.beside import beside, check_place
 from pointmass.errors import InvalidInput, unknown
 from pointmass.export.exporter import About, Exporter
+from pointmass.export.glb import write_glb
 from pointmass.export.gsd_file import write_gsd
-from pointmass.export.meshes import write_glb, write_obj
+from pointmass.export.meshes import write_obj
 from pointmass.export.npz import write_npz
 from pointmass.export.ply import write_ply
 from pointmass.export.table import write_csv
@@ -33,7 +34,7 @@ EXPORTERS: dict[str, Exporter] = {
     ".gsd": Exporter(write=write_gsd),
     ".ply": Exporter(write=write_ply, still=True),
     ".obj": Exporter(write=write_obj, still=True),
-    ".glb": Exporter(write=write_glb, still=True),
+    ".glb": Exporter(write=write_glb),
 }
 
 __all__ = ["EXPORTERS", "About", "Exporter", "check_export", "export"]
@@ -69,7 +70,7 @@ def export(
     Parameters
     ----------
     frames : such as a cache, or `sim.frames(240)` while it runs; each is read once and then let go.
-    path : `.npz`, `.csv`, `.usd`, `.pvd`, `.vtkhdf`, `.gsd`: all frames; `.vtp`, `.ply`, `.obj`, `.glb`: the last one.
+    path : `.npz`, `.csv`, `.usd`, `.pvd`, `.vtkhdf`, `.gsd`, `.glb`: all frames; `.vtp`, `.ply`, `.obj`: the last one.
         A name such as `x_%04d.ply` makes a file of any kind for each frame.
     progress : called with the number of frames written so far.
     about : what frames do not say: the frame rate and the camera, which `.usd` keeps.

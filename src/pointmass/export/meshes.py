@@ -1,9 +1,10 @@
-"""One frame as a mesh for other programs: OBJ and GLB by trimesh, and the parts of which PLY makes one."""
+"""One frame as a mesh for other programs: OBJ by trimesh, and the parts of which PLY makes one and GLB several."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.export.exporter import About
-from pointmass.export.particles import color_bytes, lonely, radii_and_colors, surfaces
+from pointmass.export.particles import color_bytes, radii_and_colors, surfaces
 from pointmass.frame import Frame, Triangles
+
+Array = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,20 +46,32 @@ def parts(frame: Frame) -> list[Part]:
 
 
 def _part(surface: Triangles, frame: Frame) -> Part:
-    corners = np.asarray(surface.faces, np.int64).ravel()
-    uv = None if surface.uv is None else np.asarray(surface.uv, np.float64).reshape(-1, 2)
-    keys = corners[:, None] if uv is None else np.column_stack([corners, uv])
-    _, first, faces = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    rows = corners[first]
+    uv = None if surface.uv is None else np.asarray(surface.uv, np.float64)
+    rows, faces, places = _vertices(np.asarray(surface.faces, np.int64).tobytes(), None if uv is None else uv.tobytes())
     color = np.asarray(surface.color, np.float64)
     return Part(
         surface.name,
         rows,
         frame.positions[rows].astype(np.float64),
-        faces.reshape(-1, 3).astype(np.int64),
-        None if uv is None else uv[first],
+        faces,
+        places,
         np.tile(color, (len(rows), 1)) if color.ndim == 1 else color[rows],
     )
+
+
+@lru_cache(maxsize=4)  # the same ones in frame after frame; to find them takes longer than to write one
+def _vertices(faces: bytes, uv: bytes | None) -> tuple[Array, Array, Array | None]:
+    """One vertex for corners of the same particle at the same place on the pattern.
+
+    Returns
+    -------
+    particle of each vertex, shape (n,); the faces in these, shape (k, 3); places on the pattern, shape (n, 2).
+    """
+    corners = np.frombuffer(faces, np.int64)
+    places = None if uv is None else np.frombuffer(uv, np.float64).reshape(-1, 2)
+    keys = corners[:, None] if places is None else np.column_stack([corners, places])
+    _, first, found = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    return corners[first], found.reshape(-1, 3).astype(np.int64), None if places is None else places[first]
 
 
 def _library() -> Any:
@@ -107,26 +122,3 @@ def _obj_points(frame: Frame) -> str:
     ]
     points = [f"p {k + 1}" for k in range(len(lines))]
     return "\n".join(["# pointmass", *lines, *points, ""])
-
-
-def write_glb(frames: Iterable[Frame], path: Path, about: About) -> None:
-    """The surfaces of a frame, each an object with TEXCOORD_0, and the particles that are drawn as points.
-
-    Lengths are in metres, and y is up.
-    """
-    for frame in frames:
-        trimesh = _library()
-        scene = trimesh.Scene()
-        for part in parts(frame):
-            material = trimesh.visual.material.PBRMaterial(
-                baseColorFactor=part.color.mean(axis=0).clip(0, 1),
-                metallicFactor=0.0,
-                roughnessFactor=0.8,
-                doubleSided=True,
-            )
-            scene.add_geometry(_mesh(part, trimesh.visual.TextureVisuals(uv=part.uv, material=material)), part.name)
-        loose = lonely(frame)
-        if len(loose):
-            colors = color_bytes(radii_and_colors(frame)[1][loose])
-            scene.add_geometry(trimesh.PointCloud(frame.positions[loose], colors), "particles")
-        path.write_bytes(scene.export(file_type="glb"))

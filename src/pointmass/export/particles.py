@@ -44,6 +44,16 @@ def lonely(frame: Frame) -> NDArray[np.int64]:
     return np.flatnonzero(alone)
 
 
+def normals(places: NDArray[np.floating[Any]], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Mean unit normals of places, shape (n, 3), weighed by the areas of their triangles; 0 where there is none."""
+    a, b, c = (places[faces[:, k]] for k in range(3))
+    across = np.cross(b - a, c - a)
+    total = np.stack([np.bincount(faces.ravel(), np.repeat(across[:, k], 3), len(places)) for k in range(3)], axis=1)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    result: NDArray[np.float64] = total / np.where(length == 0, 1, length)
+    return result
+
+
 def color_bytes(light: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
     """Linear RGBA as the bytes that files of pictures have."""
     rgb = srgb(np.clip(light[..., :3], 0, 1))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pointmass.export.exporter import About
-from pointmass.export.particles import radii_and_colors
+from pointmass.export.particles import normals, radii_and_colors
 from pointmass.frame import Arrows, Camera, Curves, Drawable, Floats, Frame, Points, Segments, Triangles
 
 Array = NDArray[Any]
@@ -237,7 +237,7 @@ def _mesh(mesh: Triangles, frame: Frame) -> dict[str, Array]:
     if mesh.vertices is None:
         values["velocities"] = _single(frame.velocities[rows])
     if mesh.smooth:
-        values["normals"] = _normals(places, corners)
+        values["normals"] = _single(normals(places, corners))
     if mesh.uv is not None:
         values["st"] = np.asarray(mesh.uv, np.float32).reshape(-1, 2)
     return values
@@ -254,15 +254,6 @@ def _lines(
         **_colored(color, len(rows)),
     }
     return values if own else values | {"velocities": _single(frame.velocities[rows])}
-
-
-def _normals(places: Array, corners: Array) -> Array:
-    """Mean normals of the corners, weighed by the areas of their triangles."""
-    a, b, c = (places[corners[:, k]] for k in range(3))
-    across = np.cross(b - a, c - a)
-    total = np.stack([np.bincount(corners.ravel(), np.repeat(across[:, k], 3), len(places)) for k in range(3)], axis=1)
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    return _single(total / np.where(length == 0, 1, length))
 
 
 def _single(values: Any) -> Array:

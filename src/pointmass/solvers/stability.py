@@ -214,11 +214,14 @@ def _oscillators(stiffness: Complex, damping: Complex) -> FunctionSystem:
 
     k = len(stiffness)
 
-    def times(factor: Complex) -> Any:
-        real, imaginary = sparse.diags_array(factor.real), sparse.diags_array(factor.imag)
-        return sparse.block_array([[real, -imaginary], [imaginary, real]])
-
-    jacobian = sparse.block_array([[None, sparse.eye_array(2 * k)], [-times(stiffness), -times(damping)]], format="csr")
+    i, one = np.arange(k), np.ones(k)
+    entries = [(i, 2 * k + i, one), (k + i, 3 * k + i, one)]
+    for first, factor in ((0, stiffness), (2 * k, damping)):
+        entries += [(2 * k + i, first + i, -factor.real), (2 * k + i, first + k + i, factor.imag)]
+        entries += [(3 * k + i, first + i, -factor.imag), (3 * k + i, first + k + i, -factor.real)]
+    rows, columns, values = (np.concatenate(parts) for parts in zip(*entries, strict=True))
+    there = values != 0.0
+    jacobian = sparse.csr_array((values[there], (rows[there], columns[there])), (4 * k, 4 * k))
     return FunctionSystem(
         lambda t, y: jacobian @ y,
         4 * k,
