@@ -228,8 +228,11 @@ class _Printer:
             for (i, q, j), out in zip(((i, q, j) for i in AXES for q in "ab" for j in AXES), text.outputs, strict=True):
                 if out != literal(0.0, self.dtype):
                     lines.append(f"{q}{i}{j} = {q}{i}{j} + {out if acts is None else f'({out} if {acts} else R(0))'}")
-        if self.projected and self.second:
+        if self.projected and self.deriv.contact is not None:
             lines += [*read("Q", "i", "s_"), *sandwich("a"), *sandwich("b")]
+            found = True
+            lines += [f"drag = R(drag_of(K, {self.deriv.contact.record} * i))"]
+            lines += [f"b{i}{j} = b{i}{j} - drag * s_{i}{j}" for i, j in SQUARE]
         lines += ["b = np.uintp(18 * i)"]
         lines += [f"U[b + np.uintp({k})] = {s}" for k, s in enumerate(sums)]
         if self.second:
