@@ -32,6 +32,9 @@ class Filter(Protocol):
     def projection(self, n: int) -> Array:
         """Directions in which contacts leave each particle free, shape (n, 3, 3)."""
 
+    def drag(self, n: int) -> Array:
+        """What friction adds to -df/dv in those directions [N s/m], shape (n,)."""
+
 
 @dataclass(frozen=True)
 class Energy:
@@ -215,6 +218,7 @@ class ParticleSystem:
         if self.filter is not None:
             project = self.filter.projection(n)
             dx, dv = (_times(_times(project[rows], d), project[columns]) for d in (dx, dv))
+            dv[:n] -= self.filter.drag(n)[:, None, None] * project  # the first are those of the particles' own forces
         weight = p.w[rows][:, None, None]
         pull, damp = (block_matrix(rows, columns, weight * d, n) for d in (dx, dv))
         moves = diags_array(np.repeat(np.where(p.pinned, 0.0, 1.0), 3))

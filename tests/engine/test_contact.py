@@ -88,6 +88,10 @@ class Filter:
             e.do["project"](e.table, e.scratch, i * e.text.record, blocks[i], np.zeros(18))
         return blocks.reshape(n, 3, 3)
 
+    def drag(self, n):
+        e = self.engine
+        return np.array([e.do["drag_of"](e.scratch, i * e.text.record) for i in range(n)])
+
 
 class ScalarEngine(ReferenceEngine):
     """The reference engine with its collisions made by the printed functions, particle by particle."""
@@ -116,7 +120,9 @@ class ScalarEngine(ReferenceEngine):
                 and not p.pinned[i]
                 and do["near"](self.table, self.scratch, o, t[i], *x[i], p.radius[i])
             ):
-                v[i] = do["find"](self.table, self.scratch, o, t[i], *x[i], *v[i], p.m[i], *a[i], p.radius[i])
+                braking = 0.0 if self._alone[i] else self.solver.braking * h[self._islands[i]]
+                state = *x[i], *v[i], p.m[i], *a[i], p.radius[i]
+                v[i] = do["find"](self.table, self.scratch, o, t[i], *state, braking)
         system.filter = Filter(self) if self.scratch[:: self.text.record].any() else None
         return y
 

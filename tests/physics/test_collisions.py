@@ -53,6 +53,35 @@ def test_C02_ball_comes_to_rest(dt):
     assert not sim.system.particles.v.any()
 
 
+@pytest.mark.parametrize("name", ["implicit_euler", "implicit_midpoint", "bdf2"])
+def test_linked_blocks_are_braked_by_mu_g_and_stay_where_they_stop(name):
+    """Under steady forces the drag that implicit solvers see is Coulomb's friction, until the last step."""
+    blocks = pm.Particles([[0, 0, 0], [0.3, 0, 0]], [3, 0, 0])
+    forces = [pm.Gravity(), pm.Springs([(0, 1)], 100.0, 1.0)]
+    sim = pm.Simulation(pm.ParticleSystem(blocks, forces, [pm.Plane(friction=0.4)]), SOLVERS[name](), 1 / 60)
+    sim.step(20)
+    np.testing.assert_allclose(blocks.v, np.tile((3 - 0.4 * G * sim.t, 0, 0), (2, 1)), atol=1e-9)
+    sim.step(40)
+    assert not blocks.v.any()
+    off = 0.03 if name == "implicit_euler" else 2e-3  # h v / 2 at the start; and h v / 2 of the step that stops them
+    assert blocks.x[0, 0] == pytest.approx(9 / (2 * 0.4 * G), abs=off)
+
+
+@pytest.mark.parametrize("compiled", [False, True], ids=["reference", "compiled"])
+def test_friction_brings_no_energy_where_springs_are_stiffer_than_the_step_is_long(compiled):
+    """The edge of a patch of cloth is bent up, stretched and lets go. A force of mu times what pressed at its
+    start, for all of a step in which the springs relax, turned round who slid, and nothing came to rest."""
+    patch = pm.cloth(6, 6, 0.2, center=(0, 0, 0), right=(1, 0, 0), down=(0, 0, 1), radius=0.0)
+    p = patch.particles
+    p.x[p.x[:, 0] > 0.09] += (0.01, 0.02, 0)
+    p.v[:, 0] = 0.2
+    system = pm.ParticleSystem(p, [pm.Gravity(), *patch.forces], [pm.Plane(friction=0.4, restitution=0.0)])
+    sim = pm.Simulation(system, pm.ImplicitEuler(tolerance=1e-3), 1 / 60, compiled=compiled)
+    sim.step(20)
+    assert not p.v.any()
+    assert system.energy().total < 1e-6
+
+
 @pytest.mark.parametrize("name", sorted(SOLVERS))
 @pytest.mark.parametrize("dt", [1 / 30, 1 / 240])
 def test_C03_block_stops(name, dt):

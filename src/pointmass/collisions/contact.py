@@ -42,6 +42,8 @@ class Standing:
     normal : normals there, shape (k, 3).
     pressed, held : whether it was pressed on there, and friction held it in its place.
     glued : whether the surface makes all of them stick.
+    drag : of those that friction brakes by a drag [N s/m], else 0, shape (k,).
+    drift : velocity along the surface at the last evaluation [m/s], shape (k, 3).
     friction : Coulomb's mu.
     """
 
@@ -56,11 +58,14 @@ class Standing:
     normal: Array = field(init=False)
     pressed: Mask = field(init=False)
     held: Mask = field(init=False)
+    drag: Array = field(init=False)
+    drift: Array = field(init=False)
 
     def __post_init__(self) -> None:
         k = len(self.rows)
         self.given, self.normal = np.zeros((k, 3)), np.zeros((k, 3))
         self.pressed, self.held = np.zeros(k, bool), np.zeros(k, bool)
+        self.drag, self.drift = np.zeros(k), np.zeros((k, 3))
         self.sticks = (self.slide == 0).all(axis=1)
         self.glued = self.surface.response == "stick"
         self.friction = self.surface.impact[1]
@@ -75,7 +80,10 @@ class Contacts:
     """The filter on forces. It is set up before each piece of a step and stays the same during it.
 
     With `lagged`, loads and whether friction holds are those of the start of the piece, and what stands then cannot
-    lift off before the next one: the filter is then linear, and Newton's method sees its exact Jacobian.
+    lift off before the next one: the filter is then linear, and Newton's method sees its exact Jacobian. A force that
+    stays the same may turn round a particle that springs hold back in a long step, and bring energy. So where the
+    length of the step is given to `find`, friction is a drag that has Coulomb's size at the velocity to which the
+    forces of the start lead; it holds at once whom it would stop. With steady forces that is the same.
     """
 
     def __init__(self, surfaces: Sequence[Collider], order: int, lagged: bool) -> None:
@@ -90,7 +98,15 @@ class Contacts:
         return next((s.rows for s in self.standing if s.surface is surface), np.zeros(0, np.intp))
 
     def find(
-        self, x: Array, v: Array, m: Array, acceleration: Callable[[], Array], t: Array, radius: Array, free: Mask
+        self,
+        x: Array,
+        v: Array,
+        m: Array,
+        acceleration: Callable[[], Array],
+        t: Array,
+        radius: Array,
+        free: Mask,
+        braking: Array | None = None,
     ) -> None:
         """Find out who stands where, and stop their motion into and out of the surface.
 
@@ -100,7 +116,10 @@ class Contacts:
         acceleration : gives the unfiltered accelerations, shape (n, 3); called only where something is near a surface.
         t : clock of each particle, shape (n,).
         free : which particles to look at.
+        braking : how long the velocity that friction sees is under way, where friction is to be a drag [s], shape (n,);
+            0, or None for all, where it is to be a force.
         """
+        braking = np.zeros(len(x)) if braking is None else braking
         self.standing = []
         a: Array | None = None
         for surface in self.surfaces:
@@ -116,7 +135,7 @@ class Contacts:
         if self.order == 2:
             self._relax(np.ones(len(x), bool), lambda stand, go: self._stop(stand, v, t, go))
         for stand in self.standing:
-            self._choose_slide(stand, v, m, a, t)
+            self._choose_slide(stand, v, m, a, t, braking[stand.rows])
 
     def forces(self, t: Any, x: Array, v: Array, m: Array, f: Array) -> None:
         """Take away what presses into the surfaces, and add friction (projected Gauss-Seidel over the contacts)."""
@@ -144,6 +163,13 @@ class Contacts:
             shared = _products(shared, shared)
         blocks[self._several] = shared
         return blocks
+
+    def drag(self, n: int) -> Array:
+        """What friction adds to -df/dv of each particle in those directions [N s/m], shape (n,)."""
+        result = np.zeros(n)
+        for stand in self.standing:
+            result[stand.rows] += stand.drag
+        return result
 
     def settle(self, x: Array, v: Array, t: Array, h: Array, radius: Array) -> None:
         """Bring those that stood back to their surface at the end of a piece; in place.
@@ -215,7 +241,7 @@ class Contacts:
         moving: Mask = np.abs(speed) > _roundoff(v[stand.rows], motion)
         return moving
 
-    def _choose_slide(self, stand: Standing, v: Array, m: Array, a: Array | None, t: Array) -> None:
+    def _choose_slide(self, stand: Standing, v: Array, m: Array, a: Array | None, t: Array, braking: Array) -> None:
         """Who slides along the surface, and in which direction friction will work."""
         if self.order == 1:
             return
@@ -239,7 +265,20 @@ class Contacts:
             pull = lengths(along)
             slips = (speed == 0) & (pull * m[rows] > stand.friction * stand.load)
             stand.slide = np.where(slips[:, None], directions(along, pull, NONE), stand.slide)
+            self._choose_drag(stand, v, m, along, motion, braking)
         stand.sticks = (stand.slide == 0).all(axis=1)
+
+    def _choose_drag(self, stand: Standing, v: Array, m: Array, along: Array, motion: Array, braking: Array) -> None:
+        """Make friction a drag where it is `braking`, and let it hold those that it would stop."""
+        slides = (braking > 0) & (stand.friction > 0) & (stand.slide != 0).any(axis=1)
+        most = stand.friction * stand.load
+        later = stand.speed + braking * (rows_dot(along, stand.slide) - most / m[stand.rows])
+        stops = slides & ~(later > 0)
+        drags = slides & ~stops
+        stand.drag = np.where(drags, most / np.where(drags, later, 1), 0)
+        stand.speed = np.where(slides, 0, stand.speed)
+        stand.slide = np.where(stops[:, None], 0, stand.slide)
+        v[stand.rows] = np.where(stops[:, None], motion, v[stand.rows])
 
     # ------------------------------------------------------------------------------------------------ during the piece
 
@@ -253,7 +292,9 @@ class Contacts:
         if self.order == 1:
             return np.broadcast_to(surface.velocity(now), local.shape), np.zeros(len(rows))
         mass = m[rows]
-        bend = surface.bending(local, v[rows] - surface.velocity(now))
+        relative = v[rows] - surface.velocity(now)
+        stand.drift = relative - rows_dot(relative, stand.normal)[:, None] * stand.normal
+        bend = surface.bending(local, relative)
         return mass[:, None] * surface.acceleration(now), mass * bend
 
     def _bear(self, stand: Standing, carried: Array, bend: Array, f: Array, friction: bool, go: Mask) -> Mask:
@@ -297,7 +338,8 @@ class Contacts:
             size = lengths(along)
             held = stand.sticks & (size <= most)
             hold = np.minimum(most / np.where(size > 0, size, 1), 1)[:, None] * along
-        return -np.where(stand.sticks[:, None], hold, most[:, None] * stand.slide), held
+        brake = np.where((stand.drag > 0)[:, None], stand.drag[:, None] * stand.drift, most[:, None] * stand.slide)
+        return -np.where(stand.sticks[:, None], hold, brake), held
 
     # ------------------------------------------------------------------------------------------------ at the end
 

@@ -9,9 +9,10 @@ was looked up for it last, are `record` numbers of a flat float64 scratch array 
 For one particle, in the order of the reference path (a pinned one is left out, with C[o] = 0):
 
     near(P, C, o, t, x, radius) -> bool                                       is `find` needed? Else C[o] = 0.
-    find(P, C, o, t, x, v, m, a, radius) -> v                             before each trial; a: unfiltered acceleration
+    find(P, C, o, t, x, v, m, a, radius, braking) -> v                    before each trial; a: unfiltered acceleration
     bear(P, C, o, t, x, v, m, f) -> f                                     in deriv_eval, on the sum of all forces
     project(P, C, o, matrix, scratch)                                     of a lagged filter: 9 numbers, with 18 scratch
+    drag_of(C, o) -> -df/dv of friction in these directions               of a lagged filter
     settle(P, C, o, t + h, h, x, v, radius) -> x, v                       after each kept step, and what follows too
     bounce(P, C, o, t + h, x, v, radius) -> x, v, hit
     strike(P, C, o, alone, events, x0, v0, x, v, t, h, radius) -> x, v, clock, events, ground
@@ -56,7 +57,7 @@ TABLE = (  # columns of a surface's row
 )
 RECORD = {  # of a contact, with the size of each
     **{"ON": 1, "LEVEL": 1, "START": 3, "SLIDE": 3, "SPEED": 1, "LOAD": 1, "GIVEN": 3, "NORMAL": 3},
-    **{"PRESSED": 1, "HELD": 1, "STICKS": 1, "CARRIED": 3, "BEND": 1},
+    **{"PRESSED": 1, "HELD": 1, "STICKS": 1, "CARRIED": 3, "BEND": 1, "DRAG": 1, "DRIFT": 3},
 }
 REMEMBERED = 8  # numbers: whether there is a point, its place, distance and normal; what a search remembers is behind
 RESPONSES = get_args(Response)

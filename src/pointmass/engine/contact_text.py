@@ -80,7 +80,7 @@ def near(P, C, o, t, x, y, z, radius):
 
 
 @njit(**APART)
-def find(P, C, o, t, x, y, z, vx, vy, vz, m, ax, ay, az, radius):
+def find(P, C, o, t, x, y, z, vx, vy, vz, m, ax, ay, az, radius, braking):
     """Who stands on what: Contacts.find. Returns the velocity, stopped."""
     count = 0
     for k in range(SURFACES):
@@ -115,7 +115,7 @@ def find(P, C, o, t, x, y, z, vx, vy, vz, m, ax, ay, az, radius):
             C[r + LOAD] = -lift * m
             C[r + GIVEN], C[r + GIVEN + 1], C[r + GIVEN + 2] = 0.0, 0.0, 0.0
             C[r + NORMAL], C[r + NORMAL + 1], C[r + NORMAL + 2] = nx, ny, nz
-            C[r + PRESSED], C[r + HELD], C[r + STICKS] = 0.0, 0.0, 1.0
+            C[r + PRESSED], C[r + HELD], C[r + STICKS], C[r + DRAG] = 0.0, 0.0, 1.0, 0.0
     C[o] = count
     if ORDER == 1 or count == 0:
         return vx, vy, vz
@@ -131,12 +131,12 @@ def find(P, C, o, t, x, y, z, vx, vy, vz, m, ax, ay, az, radius):
         if not moving:
             break
     for c in range(count):
-        vx, vy, vz = choose_slide(P, C, o + 1 + RECORD * c, t, vx, vy, vz, m, ax, ay, az)
+        vx, vy, vz = choose_slide(P, C, o + 1 + RECORD * c, t, vx, vy, vz, m, ax, ay, az, braking)
     return vx, vy, vz
 
 
 @njit(**APART)
-def choose_slide(P, C, r, t, vx, vy, vz, m, ax, ay, az):
+def choose_slide(P, C, r, t, vx, vy, vz, m, ax, ay, az, braking):
     """Contacts._choose_slide; returns the velocity."""
     k = int(C[r])
     gx, gy, gz = ground_of(P, k, t)
@@ -155,16 +155,42 @@ def choose_slide(P, C, r, t, vx, vy, vz, m, ax, ay, az):
         C[r + SLIDE], C[r + SLIDE + 1], C[r + SLIDE + 2] = ux / speed, uy / speed, uz / speed
     if speed == 0:
         vx, vy, vz = gx, gy, gz
-        if LAGGED:
-            bx, by, bz = push_of(P, k, t)
-            bx, by, bz = ax - bx, ay - by, az - bz
-            across = dot3(bx, by, bz, nx, ny, nz)
-            bx, by, bz = bx - across * nx, by - across * ny, bz - across * nz
-            pull = length3(bx, by, bz)
-            if pull * m > P[k * ROW + FRICTION] * C[r + LOAD] and pull > 0:
-                C[r + SLIDE], C[r + SLIDE + 1], C[r + SLIDE + 2] = bx / pull, by / pull, bz / pull
+    if LAGGED:
+        bx, by, bz = push_of(P, k, t)
+        bx, by, bz = ax - bx, ay - by, az - bz
+        across = dot3(bx, by, bz, nx, ny, nz)
+        bx, by, bz = bx - across * nx, by - across * ny, bz - across * nz
+        pull = length3(bx, by, bz)
+        if speed == 0 and pull * m > P[k * ROW + FRICTION] * C[r + LOAD] and pull > 0:
+            C[r + SLIDE], C[r + SLIDE + 1], C[r + SLIDE + 2] = bx / pull, by / pull, bz / pull
+        vx, vy, vz = choose_drag(P, C, r, vx, vy, vz, m, bx, by, bz, gx, gy, gz, braking)
     C[r + STICKS] = C[r + SLIDE] == 0 and C[r + SLIDE + 1] == 0 and C[r + SLIDE + 2] == 0
     return vx, vy, vz
+
+
+@njit(**APART)
+def choose_drag(P, C, r, vx, vy, vz, m, bx, by, bz, gx, gy, gz, braking):
+    """Contacts._choose_drag; returns the velocity."""
+    sx, sy, sz, friction = C[r + SLIDE], C[r + SLIDE + 1], C[r + SLIDE + 2], P[int(C[r]) * ROW + FRICTION]
+    if not (braking > 0 and friction > 0 and not (sx == 0 and sy == 0 and sz == 0)):
+        return vx, vy, vz
+    most = friction * C[r + LOAD]
+    later = C[r + SPEED] + braking * (dot3(bx, by, bz, sx, sy, sz) - most / m)
+    C[r + SPEED] = 0.0
+    if later > 0:
+        C[r + DRAG] = most / later
+        return vx, vy, vz
+    C[r + SLIDE], C[r + SLIDE + 1], C[r + SLIDE + 2] = 0.0, 0.0, 0.0
+    return gx, gy, gz
+
+
+@njit(**APART)
+def drag_of(C, o):
+    """Contacts.drag of one particle."""
+    result = 0.0
+    for c in range(int(C[o])):
+        result = result + C[o + 1 + RECORD * c + DRAG]
+    return result
 
 
 @njit(**APART)
@@ -187,7 +213,11 @@ def bear(P, C, o, t, x, y, z, vx, vy, vz, m, fx, fy, fz):
         else:
             bx, by, bz = push_of(P, k, t)
             C[r + CARRIED], C[r + CARRIED + 1], C[r + CARRIED + 2] = m * bx, m * by, m * bz
-            C[r + BEND] = m * bending_of(P, k, lx, ly, lz, vx - gx, vy - gy, vz - gz)
+            ux, uy, uz = vx - gx, vy - gy, vz - gz
+            C[r + BEND] = m * bending_of(P, k, lx, ly, lz, ux, uy, uz)
+            nx, ny, nz = C[r + NORMAL], C[r + NORMAL + 1], C[r + NORMAL + 2]
+            across = dot3(ux, uy, uz, nx, ny, nz)
+            C[r + DRIFT], C[r + DRIFT + 1], C[r + DRIFT + 2] = ux - across * nx, uy - across * ny, uz - across * nz
     alone = count == 1
     if alone:
         fx, fy, fz, _ = bear_one(P, C, o + 1, alone, fx, fy, fz)
@@ -234,7 +264,10 @@ def bear_one(P, C, r, friction, fx, fy, fz):
             C[r + HELD] = sticks and size <= most
             part = min(most / (size if size > 0 else 1.0), 1.0)
             hx, hy, hz = part * hx, part * hy, part * hz
-        if not sticks:
+        if C[r + DRAG] > 0:
+            drag = C[r + DRAG]
+            hx, hy, hz = drag * C[r + DRIFT], drag * C[r + DRIFT + 1], drag * C[r + DRIFT + 2]
+        elif not sticks:
             hx, hy, hz = most * C[r + SLIDE], most * C[r + SLIDE + 1], most * C[r + SLIDE + 2]
         wx, wy, wz = wx + -hx, wy + -hy, wz + -hz
     return give(C, r, wx, wy, wz, fx, fy, fz)

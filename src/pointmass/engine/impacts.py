@@ -21,14 +21,24 @@ class ImpactText:
     ----------
     call : the arguments of `deriv` that an island has.
     w, m, radius : of row g, as expressions.
+    braking : see `Solver.braking`.
     """
 
     def __init__(
-        self, contact: ContactText, order: int, loop: str, flags: str, call: str, w: str, m: str, radius: str
+        self,
+        contact: ContactText,
+        order: int,
+        loop: str,
+        flags: str,
+        call: str,
+        w: str,
+        m: str,
+        radius: str,
+        braking: float,
     ) -> None:
         self.contact, self.order, self.loop, self.flags, self.call = contact, order, loop, flags, call
         self.row = ["g = base + i", f"o = {contact.record} * i", "j = 3 * i", f"radius = np.float64({radius})"]
-        self.w, self.m = w, m
+        self.w, self.m, self.braking = w, m, braking
         self.text = self._prepare() + self._collide()
 
     def _state(self, x: str, v: str) -> str:
@@ -42,6 +52,7 @@ class ImpactText:
         slope = ", ".join(f"np.float64(av[j + {k}])" for k in range(3))
         keep = [f"v[j + {k}] = R(v{a})" for k, a in enumerate(XYZ)] if self.order == 2 else []
         lines = [
+            f"braking = {self.braking!r} * h if n > 1 else 0.0",
             "count = 0",
             f"for i in {self.loop}(n):",
             *indented(self.row, 1),
@@ -55,14 +66,14 @@ class ImpactText:
             f"for i in {self.loop}(n):",
             *indented(self.row, 1),
             f"    if {self.w} != 0 and {close}:",
-            f"        vx, vy, vz = find(F, K, o, t, {state}, np.float64({self.m}), {slope}, radius)",
+            f"        vx, vy, vz = find(F, K, o, t, {state}, np.float64({self.m}), {slope}, radius, braking)",
             *indented(keep, 2),
             "        if K[o] > 0:",
             "            standing += 1",
             "return standing, status",
         ]
         doc = '"""Find who stands on what, and stop their motion into it; how many do, and a status."""'
-        return function("prepare", f"{self.call}, t, x, v, av", self.flags, [doc, *lines])
+        return function("prepare", f"{self.call}, t, h, x, v, av", self.flags, [doc, *lines])
 
     def _collide(self) -> str:
         second = self.order == 2

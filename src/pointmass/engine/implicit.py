@@ -236,8 +236,11 @@ class _Printer:
             found = True
             lines.append(f"if {self.deriv.binder.switch(pairs.force)} != 0:")
             lines += [f"    {s} = {s} + {pairs.slope(k)}" for k, s in enumerate(sums)]
-        if self.projected and self.second:
+        if self.projected and self.deriv.contact is not None:
             lines += [*read("Q", "i", "s_"), *sandwich("a"), *sandwich("b")]
+            found = True
+            lines += [f"drag = R(drag_of(K, {self.deriv.contact.record} * i))"]
+            lines += [f"b{i}{j} = b{i}{j} - drag * s_{i}{j}" for i, j in SQUARE]
         lines += ["b = np.uintp(18 * i)"]
         lines += [f"U[b + np.uintp({k})] = {s}" for k, s in enumerate(sums)]
         if self.second:

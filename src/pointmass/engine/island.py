@@ -138,8 +138,9 @@ class IslandKernel:
         deriv = self.deriv
         if deriv.contact is None:
             return None
-        row = [deriv.binder.attribute(name, "g") for name in ("w", "m", "radius")]
-        return ImpactText(deriv.contact, self.system.order, deriv.loop, deriv.flags, deriv.call, *row)
+        w, m, radius = (deriv.binder.attribute(name, "g") for name in ("w", "m", "radius"))
+        flags, braking = deriv.flags, self.solver.braking
+        return ImpactText(deriv.contact, self.system.order, deriv.loop, flags, deriv.call, w, m, radius, braking)
 
     def _step_text(self) -> StepText:
         if isinstance(self.solver, Implicit):
@@ -253,7 +254,7 @@ class IslandKernel:
             ]
         before, after, beyond = [], [], ["clock = end if last else clock + h"]
         if self.impacts is not None:
-            before = [f"standing, bad = prepare({deriv.call}, clock, x, v, av)", "status |= bad"]
+            before = [f"standing, bad = prepare({deriv.call}, clock, h, x, v, av)", "status |= bad"]
             after = [
                 f"for q in {deriv.loop}(3 * n):",
                 *indented([f"{q}0[q] = {q}[q]" for q in "xv"[: self.system.order]], 1),

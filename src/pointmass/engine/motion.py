@@ -305,7 +305,7 @@ class Flight:
         mass = f"np.float64({pulled.binder.attribute('m', LANE)})"
         found = [
             *pulled.slope("t", "x", "v", "n"),
-            f"u_x, u_y, u_z = find(F, K, o, t, {state}, {mass}, {slope}, r)",
+            f"u_x, u_y, u_z = find(F, K, o, t, {state}, {mass}, {slope}, r, 0.0)",
             *[f"v_{a} = R(u_{a})" for a in AXES] * (pulled.system.order == 2),
         ]
         moved = "d_x, d_y, d_z, u_x, u_y, u_z"

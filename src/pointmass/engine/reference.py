@@ -235,7 +235,9 @@ class ReferenceEngine:
             system.calculate_forces(t, x, v)
             return p.f * p.w[:, None] if system.order == 2 else p.f.copy()
 
-        contacts.find(x, v, p.m, acceleration, t, p.radius, (h[self._islands] > 0) & ~p.pinned)
+        length = h[self._islands]
+        braking = np.where(self._alone, 0.0, self.solver.braking * length)
+        contacts.find(x, v, p.m, acceleration, t, p.radius, (length > 0) & ~p.pinned, braking)
         system.filter = contacts if contacts.standing else None
         return y
 

@@ -146,6 +146,12 @@ class Solver(Described, ABC):
         """
         return None
 
+    @property
+    def braking(self) -> float:
+        """Where in a step the velocity lies at which friction may be a drag, since the equations solve for it; 0:
+        they do not, and friction is a force."""
+        return 0.0
+
     def start(self, system: System) -> Memory:
         """Memory before the first step, and for islands that were set anew (after a collision, at birth)."""
         return {}

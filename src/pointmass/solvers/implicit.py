@@ -70,6 +70,10 @@ class Implicit(Solver):
         """The state at t + h."""
         return self._step(system, t, y, h, memory or self.start(system), self.divisions)
 
+    @property
+    def braking(self) -> float:
+        return self.c
+
     def _step(self, system: System, t: Clock, y: Array, h: Clock, memory: Memory, divisions: int) -> Step:
         """One step; islands whose equations are not solved make two of half the length."""
         step, found = self._whole(system, t, y, h, memory)
