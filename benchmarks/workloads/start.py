@@ -31,16 +31,14 @@ def table(quick: bool, turns: int, say: Callable[[str], None] = print) -> Table:
     names = list(pm.SCENES)[: 1 if quick else None]
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        kept = Path(folder, "kept")
-        cold = {name: _run(name, Path(folder, f"empty {name}"), say) for name in names}
-        for name in names:
-            _run(name, kept, say)  # compiles
+        kept = {name: Path(folder, name) for name in names}
+        cold = {name: _run(name, kept[name], say) for name in names}
         warm: dict[str, list[float]] = {name: [] for name in names}
         least: list[float] = []
         for _ in range(min(turns, MOST_TURNS)):
             least.append(_timed([sys.executable, "-c", "import numpy"], {}))
             for name in names:
-                warm[name].append(_run(name, kept, say))
+                warm[name].append(_run(name, kept[name], say))
         for name in names:
             rows.append([name, _seconds(min(warm[name])), _seconds(median(warm[name])), _seconds(cold[name])])
     rows.append(["Python and NumPy alone", _seconds(min(least)), _seconds(median(least)), ""])

@@ -23,6 +23,7 @@ from pointmass.collisions.collider import Array, Collider, lengths, rows_dot
 RESOLUTION = 2.0**-50  # of a fraction of the way
 ROOT_STEPS = 128  # every second one halves the bracket or the step
 MOST_CHORDS = 4096
+CHORDS_AT_ONCE = 2**16
 NEWTON_STEPS = 60
 BACK_STEPS = 60  # each twice as long as the one before
 MARGIN = 0.0625  # of eps: a march goes on by at least this much, and so may miss a part that is as thin
@@ -259,25 +260,28 @@ def _swing(surface: Collider, paths: Paths) -> Array:
 
 
 def _brackets(approach: _Approach) -> tuple[Array, Array]:
-    """Fractions between which each path first goes from outside to inside; (nan, inf) where it does not."""
+    """Fractions between which each path first goes from outside to inside; (nan, inf) where it does not.
+
+    Chord after chord of all paths, and the longer it takes, the more of them at a time.
+    """
     chords = approach.chords()
-    k = len(chords)
-    low, high = np.full(k, np.nan), np.full(k, np.inf)
-    start = np.zeros(k)
-    for j in range(1, int(chords.max()) + 1):
-        open_ = (chords >= j) & np.isinf(high)
-        if not open_.any():
-            break
-        end = np.minimum(j / chords, 1.0)
-        inside = np.where(approach.gap(end) < 0, end, np.nan)
-        if approach.bulges and (look := open_ & np.isnan(inside)).any():
-            part = approach.take(look)
-            middle = _deepest(part, part.local(start[look]), part.local(end[look]))
+    low, high = np.full(len(chords), np.nan), np.full(len(chords), np.inf)
+    first, count = 1, 1
+    while len(paths := np.flatnonzero((chords >= first) & np.isinf(high))):
+        rows, turn = np.repeat(paths, count), np.tile(np.arange(first, first + count), len(paths))
+        rows, turn = rows[turn <= chords[rows]], turn[turn <= chords[rows]]
+        part = approach.take(rows)
+        start, end = (turn - 1) / chords[rows], turn / chords[rows]
+        inside = np.where(part.gap(end) < 0, end, np.nan)
+        if approach.bulges and (look := np.isnan(inside)).any():
+            beside = part.take(look)
+            middle = _deepest(beside, beside.local(start[look]), beside.local(end[look]))
             inside[look] = start[look] + middle * (end - start)[look]
-        sunk = open_ & ~np.isnan(inside)
-        sunk[sunk] = approach.take(sunk).gap(inside[sunk]) < 0
-        low, high = np.where(sunk, start, low), np.where(sunk, inside, high)
-        start = end
+        sunk = ~np.isnan(inside)
+        sunk[sunk] = part.take(sunk).gap(inside[sunk]) < 0
+        hit, where = np.unique(rows[sunk], return_index=True)  # chords of a path follow each other
+        low[hit], high[hit] = start[sunk][where], inside[sunk][where]
+        first, count = first + count, min(2 * count, max(1, CHORDS_AT_ONCE // len(paths)))
     return low, high
 
 
