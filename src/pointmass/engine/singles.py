@@ -30,8 +30,8 @@ Array = NDArray[np.floating[Any]]
 Rows = NDArray[np.intp]
 GRAIN = 4  # tiles that are worth a thread
 BUNCH = 32  # lanes of which it is asked in one go whether somebody waits
-UNROLLED = (4, 1)  # steps that a lane makes in registers
-LONG = 100  # statements of a step that are not unrolled
+UNROLLED = (8, 4, 2)  # steps that a lane makes in registers, if all of them are not longer than
+LONG = 450  # statements
 TRANSPOSED = f'''@njit(**FLAGS)
 def load(s, offset, x, lo, m):
     """Rows of x, (x, y, z) each, to three runs of lanes."""
@@ -129,8 +129,8 @@ class SinglesKernel:
             step += motion.watched(clear)
         timed = motion.timed or (clear is not None and bool(clear.step))
         size = len(step) + (0 if clear is None else len(clear.inner))
-        long = timed or size > LONG or bool(motion.binder.functions)  # functions are longer than they look
-        unrolled = [u for u in UNROLLED if u == 1 or not long]
+        several = not (timed or motion.binder.functions)  # functions are longer than they look
+        unrolled = [*[u for u in UNROLLED if several and u * size <= LONG][:1], 1]
         lanes = [self._unrolled(u, step, clear) for u in unrolled]
         alone = "" if flight is None else flight.text + WAITING
         return "".join([REACHED, motion.binder.functions, alone, TRANSPOSED, *lanes, self._run(unrolled, clear)])
