@@ -215,9 +215,10 @@ def bear(P, C, o, t, x, y, z, vx, vy, vz, m, fx, fy, fz):
             C[r + CARRIED], C[r + CARRIED + 1], C[r + CARRIED + 2] = m * bx, m * by, m * bz
             ux, uy, uz = vx - gx, vy - gy, vz - gz
             C[r + BEND] = m * bending_of(P, k, lx, ly, lz, ux, uy, uz)
-            nx, ny, nz = C[r + NORMAL], C[r + NORMAL + 1], C[r + NORMAL + 2]
-            across = dot3(ux, uy, uz, nx, ny, nz)
-            C[r + DRIFT], C[r + DRIFT + 1], C[r + DRIFT + 2] = ux - across * nx, uy - across * ny, uz - across * nz
+            if C[r + DRAG] > 0:
+                nx, ny, nz = C[r + NORMAL], C[r + NORMAL + 1], C[r + NORMAL + 2]
+                across = dot3(ux, uy, uz, nx, ny, nz)
+                C[r + DRIFT], C[r + DRIFT + 1], C[r + DRIFT + 2] = ux - across * nx, uy - across * ny, uz - across * nz
     alone = count == 1
     if alone:
         fx, fy, fz, _ = bear_one(P, C, o + 1, alone, fx, fy, fz)

@@ -136,9 +136,12 @@ class Engine:
         """What of the system has no kernel, and what would have: a sentence each."""
         found = []
         for force in self.system.forces:
-            if isinstance(force, PairForce) and isinstance(self.solver, Implicit):
-                if not (self.system.order == 2 and has_slopes(force, self.system.particles)):
-                    found.append(f"pairs such as {force.called} have no kernel under {self.solver.name}: use leapfrog")
+            if (
+                isinstance(force, PairForce)
+                and isinstance(self.solver, Implicit)
+                and not has_slopes(force, self.system)
+            ):
+                found.append(f"pairs such as {force.called} have no kernel under {self.solver.name}: use leapfrog")
             elif not isinstance(force, (UnaryForce, ElementForce, PairForce)):
                 found.append(
                     f"{force.called} is a NumPy function: use a law, such as pm.unary_force or pm.spring_force"

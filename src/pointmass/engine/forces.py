@@ -78,6 +78,7 @@ class Deriv:
     Attributes
     ----------
     text : the function.
+    solved : whether a matrix of slopes is solved for.
     families : of elements, in the order of the forces.
     pairs : forces between all particles, or those within a cut-off.
     contact : what the colliders do to a particle, if there are any.
@@ -105,8 +106,9 @@ class Deriv:
         self.pairs: list[Pairs] = []
         self._searches: dict[str, str] = {}  # for neighbours, by their text
         self.loop = "prange" if parallel else "range"
-        several = implicit and not relaxed  # functions are called in several places, and would be as many copies
-        self.flags = "parallel=True, **OWNING" if parallel else "**APART" if several else "**FLAGS"
+        self.solved = implicit and not relaxed
+        # Where it is, functions are called in several places, and would be as many copies.
+        self.flags = "parallel=True, **OWNING" if parallel else "**APART" if self.solved else "**FLAGS"
         self.once = self.flags if parallel else "forceinline=True, **FLAGS"  # each array is seven arguments of a call
         self._at_time: list[str] = []
         self.text = self._printed()
@@ -217,10 +219,9 @@ class Deriv:
 
     def _pairs(self, force: PairForce) -> tuple[list[str], list[str]]:
         """Statements that evaluate all pairs, and those that add what they do to a particle."""
-        number = len(self.families) + len(self.pairs)
-        pairs = Pairs(force, number, self.binder, self.parallel, self._searches, self.implicit and not self.relaxed)
+        j = len(self.families) + len(self.pairs)
+        pairs = Pairs(force, j, self.binder, self.parallel, self._searches, self.solved)
         self.pairs.append(pairs)
-        j = pairs.number
         evaluate = [f"# {force.name}", f"if {self.acting(pairs)}:", f"    status |= {pairs.call()}"]
         gather = [
             f"if {self.binder.switch(force)} != 0:",

@@ -6,6 +6,7 @@ What the others do to a particle is added up in an order that depends on no thre
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,9 @@ from pointmass.engine.binding import Binder
 from pointmass.engine.printing import indented, statements
 from pointmass.laws.pairs import PairForce
 from pointmass.particles import Particles
+from pointmass.system import ParticleSystem
 from pointmass.tracing.columns import expanded
+from pointmass.tracing.program import Program
 from pointmass.tracing.trace import trace, vector_names
 
 TILES = {True: 256, False: 16}  # particles of all pairs whose sums grow side by side: parallel or not
@@ -34,7 +37,7 @@ SLOPES = 21  # numbers of a row for implicit solvers: df/dx and df/dv by its own
 FULL = 16  # status: the list has too little room
 
 Rows = NDArray[np.intp]
-Slopes = dict[tuple[int, int, int], str]
+Slopes = NDArray[np.object_]  # expressions of slopes: axis of the force, 0: x, 1: v, axis
 
 
 class Pairs:
@@ -298,7 +301,8 @@ class Pairs:
             *law.result("H[s + L[k]]", "k"),
         ]
         scratch = [f"y = np.empty({(4 + len(more)) * PIECE}, R)", f"z = np.empty({law.sums * step}, R)"]
-        build, listed = self._build(), self._listed()
+        name, build = self._build()
+        listed = self._listed(name)
         parts = [*build, *self._head(), *indented([*listed, *self._each(scratch, particle), "return status"], 1)]
         if self.implicit:
             parts += ["", "", *self._head("slopes", "gamma", "gap")]
@@ -321,7 +325,7 @@ class Pairs:
         lines, first, second, turned = law.slopes(own, other, "j_")
         axes = range(3)
         places = [(i, c) for i in axes for c in axes]
-        sums = [f"{q}{i}{c}" for q in "ab" for i, c in places]
+        sums = [*(f"{q}{i}{c}" for q in "ab" for i, c in places), "l0", "l1", "l2"]
         block = []
         for i, c in places:
             slope, back = (f"R(0.5) * ({second[i, q, c]} + {turned[c, q, i]})" for q in (0, 1))
@@ -340,7 +344,7 @@ class Pairs:
         ]
         return [
             "k = np.int64(L[2 * top + r])",
-            *(f"{name} = R(0)" for name in (*sums, "l0", "l1", "l2")),
+            *(f"{name} = R(0)" for name in sums),
             "found = r * room",
             "for q in range(r * room, r * room + np.int64(L[top + r])):",
             "    b = np.int64(N[np.uintp(q)])",
@@ -350,7 +354,7 @@ class Pairs:
             "g1 = np.int64(H[s + L[k]])",
             "I[2 * g1] = r * room",
             "I[2 * g1 + 1] = found - r * room",
-            *(f"D[np.uintp({SLOPES} * g1 + {a})] = {name}" for a, name in enumerate((*sums, "l0", "l1", "l2"))),
+            *(f"D[np.uintp({SLOPES} * g1 + {a})] = {name}" for a, name in enumerate(sums)),
         ]
 
     @property
@@ -361,14 +365,15 @@ class Pairs:
         axes = range(3 * (force.box is not None))
         return reach, [numbers.number(f"side {id(force)} {a}", _side(force, a)) for a in axes]
 
-    def _build(self) -> list[str]:
-        """The function that lists neighbours, unless there is one of the same text."""
+    def _build(self) -> tuple[str, list[str]]:
+        """The name of the function that lists neighbours, and its text unless there is one of the same text."""
         search = self._search(self.force.box is not None)
         mine = f"build{self.number}"
-        self._built = self._searches.setdefault("\n".join(search), mine)
-        return [f"@njit({self.flags})", f"def {mine}{search[0]}", *search[1:], "", ""] if self._built == mine else []
+        name = self._searches.setdefault("\n".join(search), mine)
+        text = [f"@njit({self.flags})", f"def {mine}{search[0]}", *search[1:], "", ""]
+        return name, text if name == mine else []
 
-    def _listed(self) -> list[str]:
+    def _listed(self, build: str) -> list[str]:
         """Statements that copy what the law reads, and find the neighbours anew where somebody has moved too far."""
         law, loop = self._law, self.loop
         reach, sides = self._reaches
@@ -391,7 +396,7 @@ class Pairs:
             "n = top + 1",
             "for turn in range(2):",
             "    if K[0] == 0:",
-            f"        problem = {self._built}({', '.join(given)})",
+            f"        problem = {build}({', '.join(given)})",
             "        if problem == 1:",
             "            for k in range(3 * m):",
             "                F[3 * H[s + k // 3] + k % 3] = R(np.nan)",
@@ -679,37 +684,30 @@ class _Law:
         self, first: dict[str, str], second: dict[str, str], prefix: str
     ) -> tuple[list[str], list[str], list[str]]:
         """Statements for one pair, and the outputs for its first and for its second particle."""
-        both = expanded(self.program)
-        both.outputs += expanded(self.program, both, self._turned).outputs
-        dtype, call = self.binder.dtype, self.binder.caller(both)
-        lines, outputs = statements(both, self._names(first, second), f"{self.tag}{prefix}", dtype, call)
-        return lines, outputs[: self.sums], outputs[self.sums :]
+        return self._both(self.program, self.program, first, second, prefix)
 
     def slopes(
         self, own: dict[str, str], other: dict[str, str], prefix: str
     ) -> tuple[list[str], Slopes, Slopes, Slopes]:
         """Statements for one pair, and the slopes of the force on its first particle by the state of the first, by that
-        of the second, and of the force on the second by the state of the first: (axis of the force, 0: x, 1: v, axis).
-        """
-        slopes = self.force.traced_slopes.program
-        both = expanded(slopes)
-        both.outputs += expanded(slopes, both, self._turned).outputs
+        of the second, and of the force on the second by the state of the first."""
+        program = self.force.traced_slopes.program
+        shape = (self.sums, 2, 2, 3)  # sum, node, x|v, axis
+        by_second = np.reshape(program.outputs, shape)[:, 1].ravel().tolist()
+        lines, mine, turned = self._both(program, replace(program, outputs=by_second), own, other, prefix)
+        slopes = np.reshape(np.array(mine, object), shape)
+        return lines, slopes[:, 0], slopes[:, 1], np.reshape(np.array(turned, object), (self.sums, 2, 3))
+
+    def _both(
+        self, program: Program, turned: Program, first: dict[str, str], second: dict[str, str], prefix: str
+    ) -> tuple[list[str], list[str], list[str]]:
+        """Statements of a program for a pair, and of another one for the same pair turned round; outputs of each."""
+        both = expanded(program)
+        count = len(both.outputs)
+        both.outputs += expanded(turned, both, self._turned).outputs
         dtype, call = self.binder.dtype, self.binder.caller(both)
-        lines, outputs = statements(both, self._names(own, other), f"{self.tag}{prefix}", dtype, call)
-        keys = [
-            (turn, node, i, q, c)
-            for turn in (0, 1)
-            for i in range(3)
-            for node in (0, 1)
-            for q in (0, 1)
-            for c in range(3)
-        ]
-        entry = dict(zip(keys, outputs, strict=True))
-        parts = (
-            {key[2:]: value for key, value in entry.items() if key[:2] == part} for part in ((0, 0), (0, 1), (1, 1))
-        )
-        first, second, turned = parts
-        return lines, first, second, turned
+        lines, outputs = statements(both, self._names(first, second), f"{self.tag}{prefix}", dtype, call)
+        return lines, outputs[:count], outputs[count:]
 
     @property
     def _turned(self) -> dict[str, str]:
@@ -817,9 +815,10 @@ class PairArrays:
             self._blocks[1:3] = np.empty(room * count, np.int32), np.empty(9 * room * count, self.particles.dtype)
 
 
-def has_slopes(force: PairForce, particles: Particles) -> bool:
+def has_slopes(force: PairForce, system: ParticleSystem) -> bool:
     """Whether implicit solvers have a kernel of a force."""
-    return force.reach(particles) is not None and force.finish is None and force.by is None
+    near = system.order == 2 and force.reach(system.particles) is not None
+    return near and force.finish is None and force.by is None
 
 
 def _rows(force: PairForce, particles: Particles, place: Rows) -> tuple[Rows, Rows]:

@@ -139,12 +139,7 @@ class SinglesKernel:
         """The function that makes a few steps of all lanes, with the state in registers in between."""
         arguments = ", ".join([*self.shared, *(f"t{j}" for j in range(count + 1))])
         looks = [] if clear is None else self._looks(clear)
-        lines = [
-            *self._head(count, clear),
-            *looks,
-            *_lanes(self._lane(count, step, clear)),
-            "return status, waiting",
-        ]
+        lines = [*self._head(count, clear), *looks, *_lanes(self._lane(count, step, clear)), "return status, waiting"]
         return function(f"lanes{count}", arguments, "**FLAGS", lines)
 
     def _head(self, unrolled: int, clear: ClearLines | None) -> list[str]:
@@ -215,6 +210,7 @@ class SinglesKernel:
         marks = [f"died[lo + i] = 1 if events >= {KILLED} else 0"] if self.deadly else []
         marks += ["if events > 0:", "    hit[lo + i] = 1"] if self.watched else []
         birth = "birth[lo + i]" if self.births else "-np.inf"
+        given = f"np.uintp(i), {', '.join(flight.arrays)}, t0, dt, k, k + stride, {birth}"
         return [
             f"for bunch in range(0, {W}, {BUNCH}):",
             f"    if not somebody_waits(s, bunch, {BUNCH}):",
@@ -222,9 +218,9 @@ class SinglesKernel:
             f"    for i in range(bunch, bunch + {BUNCH}):",
             f"        if {waiting} != 0:",
             *(f"            s[{k * W} + i] = s[{(BEFORE + k) * W} + i]" for k in range(len(self.motion.entries))),
-            f"        if {waiting} != 0 and i < m and bad == 0{alive}:",
-            f"            bad, events = fly(np.uintp(i), {', '.join(flight.arrays)}, t0, dt, k, k + stride, {birth})",
-            *indented(marks, 3),
+            f"            if i < m and bad == 0{alive}:",
+            f"                bad, events = fly({given})",
+            *indented(marks, 4),
             f"        {waiting} = {'R(1) if i < m and died[lo + i] != 0 else ' if self.deadly else ''}R(0)",
         ]
 

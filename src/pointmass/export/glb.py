@@ -163,8 +163,9 @@ class _Run:
         """No frame more; it is seen until `end`, None = to the end of all."""
         file, shape = self._file, self.first
         *before, last = self._views
+        ends = {name: file.values(view) for name, view in last.items()}
         primitive: dict[str, Any] = {
-            "attributes": {name: file.accessor(view, file.values(view)) for name, view in last.items()},
+            "attributes": {name: file.accessor(view, ends[name]) for name, view in last.items()},
             "mode": POINTS if shape.faces is None else TRIANGLES,
         }
         if shape.uv is not None:
@@ -176,7 +177,7 @@ class _Run:
             primitive["material"] = file.material(shape.name, shape.light)
         if before:
             primitive["targets"] = [
-                {name: file.accessor(view, file.less(view, last[name])) for name, view in views.items()}
+                {name: file.accessor(view, file.less(view, ends[name])) for name, view in views.items()}
                 for views in before
             ]
         rest = {"weights": [0] * len(before)} if before else {}
@@ -227,9 +228,9 @@ class _File:
         self._stream.seek(place["byteOffset"])
         return np.frombuffer(self._stream.read(place["byteLength"]), dtype).reshape(shape)
 
-    def less(self, view: int, base: int) -> Array:
+    def less(self, view: int, base: Array) -> Array:
         """Write the difference to another one in the place of an array; returns it."""
-        difference: Array = self.values(view) - self.values(base)
+        difference: Array = self.values(view) - base
         self._stream.seek(self._lists["bufferViews"][view]["byteOffset"])
         self._stream.write(difference.tobytes())
         return difference
